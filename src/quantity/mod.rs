@@ -90,7 +90,7 @@ impl Quantity {
         match self {
             Self::Constant(_) | Self::Table(_) => false,
             Self::Expression(expression) => expression.names(axis),
-            Self::Field(field) => field.ranges().iter().any(|(of, _)| *of == axis),
+            Self::Field(field) => field.has(axis),
         }
     }
 

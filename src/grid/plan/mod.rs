@@ -25,6 +25,7 @@ use super::constraints::moments::rows_of;
 use super::constraints::parents::node_coord;
 use super::mask::{bit_of_node, bits, block_nodes, node_of_bit, offset, offset_count, shifted};
 use crate::csr::Csr;
+use crate::geometry::Aabb;
 use crate::kernel::constrained_nodes::ConstrainedNodes;
 use crate::kernel::{ARENA_EDGE, Frame};
 
@@ -193,6 +194,11 @@ impl<const D: usize> GridPlan<D> {
     /// Place of the node of a bit of a block, m from the lower corner of the domain.
     pub fn node_place(&self, block: &Block<D>, bit: usize) -> [f64; D] {
         node_coord(block.coord, bit as u32).map(|x| f64::from(x) * self.cell(block.level))
+    }
+
+    /// The box from the first node of a block to its last, m from the lower corner of the domain.
+    pub fn nodes_box(&self, block: &Block<D>) -> Aabb<D> {
+        Aabb::new(self.node_place(block, 0), self.node_place(block, block_nodes(D) - 1))
     }
 
     /// Number of levels, the deepest included.

@@ -83,6 +83,14 @@ impl Field {
             }
     }
 
+    /// Whether it has a coordinate; 0: x.
+    pub fn has(&self, axis: usize) -> bool {
+        match &self.values {
+            Values::Grid(grid) => grid.axes.iter().any(|(of, _)| *of == axis),
+            Values::Triangles(triangles) => triangles.axes.contains(&axis),
+        }
+    }
+
     /// Its coordinates (0: x), with the range of its places, m.
     pub fn ranges(&self) -> Vec<(usize, [f64; 2])> {
         let mut ranges = match &self.values {

@@ -27,7 +27,7 @@ type Mesh = DelaunayTriangulation<Sample, (), (), (), HierarchyHintGenerator<f64
 /// Values at points over two coordinates.
 #[derive(Debug)]
 pub(super) struct Triangles {
-    axes: [usize; 2],
+    pub(super) axes: [usize; 2],
     mesh: Mesh,
 }
 

@@ -3,11 +3,9 @@ use crate::boundary::{Collider, Contact};
 use rustc_hash::FxHashMap;
 
 use crate::boundary::motion::{Motion, Pose};
-use crate::geometry::Aabb;
 use crate::grid::GridPlan;
 use crate::grid::mask::bits;
 use crate::grid::plan::Block;
-use crate::kernel::BLOCK;
 use crate::solver::physics::Physics;
 
 /// Length, in cells, below which places are the same.
@@ -115,11 +113,12 @@ impl<const D: usize> Inside<D> {
         let mut inside = Self::default();
         let cell = plan.cell(block.level);
         let reach = cell * (D as f64).sqrt() * (1.0 + SAME);
-        if collider.distance_to_box(&nodes_box(block, cell), pose) > reach {
+        let nodes_box = plan.nodes_box(block);
+        if collider.distance_to_box(&nodes_box, pose) > reach {
             return inside;
         }
         let near = |(other, pose): &&Placed<'_, D>| {
-            !std::ptr::eq(*other, collider) && other.distance_to_box(&nodes_box(block, cell), pose) <= reach
+            !std::ptr::eq(*other, collider) && other.distance_to_box(&nodes_box, pose) <= reach
         };
         let beside: Vec<Placed<'_, D>> = match asked.planes {
             true => beside.iter().filter(near).copied().collect(),
@@ -348,19 +347,11 @@ pub(in crate::solver) fn is_still<const D: usize>(collider: &Collider<D>) -> boo
     matches!(collider.motion, Motion::Fixed) && collider.deforming.is_none()
 }
 
-/// The box that a block's nodes span.
-fn nodes_box<const D: usize>(block: &Block<D>, cell: f64) -> Aabb<D> {
-    let edge = BLOCK as u32;
-    Aabb::new(
-        block.coord.map(|c| f64::from(edge * c) * cell),
-        block.coord.map(|c| f64::from(edge * c + edge - 1) * cell),
-    )
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::boundary::ActsOn;
+    use crate::geometry::Aabb;
     use crate::geometry::Shape;
 
     /// Feet and normals of a node among cells of 1 m inside a collider of this shape.

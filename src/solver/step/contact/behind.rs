@@ -8,9 +8,7 @@ use rayon::prelude::*;
 
 use crate::boundary::motion::Rate;
 use crate::exact_sum::ExactSum;
-use crate::geometry::Aabb;
 use crate::grid::mask::{bits, block_nodes};
-use crate::kernel::BLOCK;
 use crate::solver::state::Solver;
 use crate::solver::state::bookings::SUMS;
 use crate::solver::state::phases::Phase;
@@ -49,11 +47,7 @@ impl<const D: usize> Solver<D> {
             let found = active.filter(|&index| fields.active[index]).map(|index| {
                 let block = &plan.blocks[index];
                 let cell = plan.cell(block.level);
-                let edge = BLOCK as u32;
-                let nodes = Aabb::new(
-                    block.coord.map(|c| f64::from(edge * c) * cell),
-                    block.coord.map(|c| f64::from(edge * c + edge - 1) * cell),
-                );
+                let nodes = plan.nodes_box(block);
                 let deep = -DEEP * cell;
                 let mut behind = Vec::new();
                 for (number, (collider, state)) in acting() {

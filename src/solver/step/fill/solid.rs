@@ -1,10 +1,8 @@
 //! Space at nodes that colliders occupy.
 use crate::boundary::{Collider, ColliderState};
-use crate::geometry::Aabb;
 use crate::grid::GridPlan;
 use crate::grid::mask::{bits, block_nodes};
 use crate::grid::plan::Block;
-use crate::kernel::BLOCK;
 use crate::solver::state::inside::is_still;
 use crate::solver::state::node_fill::OpenShares;
 
@@ -78,12 +76,7 @@ fn cut<const D: usize>(
     open: &mut OpenShares,
 ) {
     let cell = plan.cell(block.level);
-    let edge = BLOCK as u32;
-    let nodes = Aabb::new(
-        block.coord.map(|c| f64::from(edge * c) * cell),
-        block.coord.map(|c| f64::from(edge * c + edge - 1) * cell),
-    );
-    if collider.distance_to_box(&nodes, &state.pose) >= cell {
+    if collider.distance_to_box(&plan.nodes_box(block), &state.pose) >= cell {
         return;
     }
     open.0.resize(block_nodes(D), 1.0);
