@@ -12,10 +12,10 @@ pub use crate::io::snapshot::PointField as Field;
 use crate::job::parse::error::Position;
 pub use crate::kernel::{BoxPolicy, Coordinates, Transfer};
 use crate::load::{Gravity, Load, Seepage, Water};
-use crate::material::Material;
 use crate::material::initial::Consolidation;
 use crate::material::parameters::Parameters;
 use crate::material::undrained::{self, Undrained};
+use crate::material::{Material, Viscosity};
 use crate::particle::followed::Followed;
 use crate::particle::given::Given;
 use crate::probe::{Flux, Line, Map, Probe, Track};
@@ -165,6 +165,8 @@ pub struct Problem<const D: usize> {
     pub boxes: BoxPolicy,
     /// Whether particles strain with the mean rate of dilation of their cell (F-bar).
     pub f_bar: bool,
+    /// Artificial viscosity, if there is any.
+    pub viscosity: Option<Viscosity>,
     /// Whether surface nodes are tied.
     pub tied_surfaces: bool,
     /// Output files.

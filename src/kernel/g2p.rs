@@ -21,7 +21,7 @@ use super::leavers::Leavers;
 use super::weights::{NodeWeights, Weights};
 use super::{Coordinates, Frame, Row, Scheme, Select, SubBox, Transfer, domain};
 use crate::material::eigen::determinant;
-use crate::material::{self, State, Step};
+use crate::material::{self, Shock, State, Step};
 use crate::particle::chunk::{Chunk, Layout, Place};
 use crate::simd::{Kernel, LANES, Lanes, Vector, VectorMask, widest};
 
@@ -343,11 +343,13 @@ impl Advance<'_> {
             (0..D).for_each(|i| gradient[i][i] += added);
         }
         let mut trial = strained(&elastic, &gradient, step);
+        let mut rate_of_volume = (1..D).fold(gradient[0][0], |sum, i| sum + gradient[i][i]);
         if is_ring {
             let mut rate = plain[2];
             if !dilation.is_empty() {
                 rate += batch.values(dilation);
             }
+            rate_of_volume += rate;
             let stretch = rate.mul_add(step, V::splat(1.0));
             trial[2] = stretch * stretch * elastic[2];
         }
@@ -367,7 +369,8 @@ impl Advance<'_> {
             }
         }
         let size = if scheme.softens { scheme.sizes(tags, batch) } else { [0.0; LANES] };
-        let update = Step { dt, plane: D == 2, cell, size };
+        let shock = scheme.viscosity.map(|viscosity| Shock { viscosity, rate: rate_of_volume.to_array() });
+        let update = Step { dt, plane: D == 2, cell, size, shock };
         match scheme.materials {
             [only] => only.update(&mut state, &update),
             several => material::update(several, &index, &mut state, &update),
@@ -391,6 +394,8 @@ impl Advance<'_> {
                     sum += history;
                 }
             }
+        }
+        if plastic || scheme.viscosity.is_some() {
             let work = batch.load::<V>(tile, Layout::<D>::WORK) + result(&state.work);
             batch.store(tile, Layout::<D>::WORK, work);
             sum += work;

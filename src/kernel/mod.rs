@@ -6,7 +6,7 @@
 use bytemuck::{Pod, Zeroable};
 
 use self::batch::Batch;
-use crate::material::Material;
+use crate::material::{Material, Viscosity};
 use crate::particle::chunk::Tag;
 use crate::simd::{F64x4, LANES, Lanes, Vector};
 
@@ -217,6 +217,8 @@ pub struct Scheme<'a> {
     pub softens: bool,
     /// Whether particles strain with the mean rate of dilation of their cell (F-bar).
     pub f_bar: bool,
+    /// Artificial viscosity, if there is any.
+    pub viscosity: Option<Viscosity>,
     /// Number of carried columns that are shares of a whole, which add up in a merge; those behind are
     /// values, which average.
     pub shares: usize,
@@ -252,6 +254,7 @@ impl<'a> Scheme<'a> {
             histories,
             softens,
             f_bar: false,
+            viscosity: None,
             shares: 0,
             elastic_stretch: boxes.greatest_stretch(),
             has_halves: false,

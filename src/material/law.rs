@@ -2,6 +2,7 @@
 //! that the solver calls ([`Material`]).
 use super::initial::Consolidation;
 use super::laws::hencky::Hencky;
+use super::shock::Shock;
 use super::tensor::eigen::Symmetric;
 use super::{HISTORIES, PLASTIC_STRAIN};
 use crate::simd::{Kernel, LANES, Lanes, Vector, widest};
@@ -78,12 +79,14 @@ pub struct Step {
     /// Edge of the cells that each particle was made for, m: regularises softening. 0: no cells. Set only for
     /// models that ask for it ([`Material::softens`]).
     pub size: [f64; LANES],
+    /// Artificial viscosity; `None`: there is none.
+    pub shock: Option<Shock>,
 }
 
 impl Step {
     /// An update without increment and without cells.
     pub fn rest(plane: bool) -> Self {
-        Self { dt: 0.0, plane, cell: f64::INFINITY, size: [0.0; LANES] }
+        Self { dt: 0.0, plane, cell: f64::INFINITY, size: [0.0; LANES], shock: None }
     }
 }
 
@@ -101,6 +104,25 @@ pub trait Law: std::fmt::Debug + Send + Sync {
     /// See [`Material::energy`]. To be marked `inline(always)`.
     fn energy<V: Vector>(&self, state: &State<V>, plane: bool) -> V;
 
+    /// Takes up heat (J/m³, per reference volume) after an update: that of artificial viscosity. By default it
+    /// counts as plastic work. To be marked `inline(always)`.
+    #[inline(always)]
+    fn take_heat<V: Vector>(&self, state: &mut State<V>, heat: V) {
+        state.work += heat;
+    }
+
+    /// All of an update: [`Law::respond`] and artificial viscosity.
+    #[inline(always)]
+    fn advance<V: Vector>(&self, state: &mut State<V>, step: &Step)
+    where
+        Self: Sized,
+    {
+        self.respond(state, step);
+        if let Some(shock) = &step.shock {
+            shock.press(self, state, step);
+        }
+    }
+
     /// See [`Material::density`].
     fn density(&self) -> f64;
 
@@ -109,6 +131,11 @@ pub trait Law: std::fmt::Debug + Send + Sync {
 
     /// See [`Material::viscous_speed`].
     fn viscous_speed(&self, _cell: f64) -> f64 {
+        0.0
+    }
+
+    /// See [`Material::rest_pressure`].
+    fn rest_pressure(&self) -> f64 {
         0.0
     }
 
@@ -183,6 +210,11 @@ pub trait Material: std::fmt::Debug + Send + Sync {
     /// viscous stress is stable, m/s.
     fn viscous_speed(&self, cell: f64) -> f64;
 
+    /// Pressure of the undeformed material, Pa: that of a gas; 0 for all that is at rest without stress.
+    fn rest_pressure(&self) -> f64 {
+        0.0
+    }
+
     /// Names of the history variables in use, at most [`HISTORIES`]. The first, if there are any, is a
     /// measure of plastic strain; the second, if there are two, the logarithm of the plastic volume ratio;
     /// more belong to the model.
@@ -256,6 +288,10 @@ impl<L: Law> Material for L {
         Law::viscous_speed(self, cell)
     }
 
+    fn rest_pressure(&self) -> f64 {
+        Law::rest_pressure(self)
+    }
+
     fn history_names(&self) -> &'static [&'static str] {
         Law::history_names(self)
     }
@@ -304,7 +340,7 @@ impl<L: Law> Kernel for Response<'_, L> {
     fn run<V: Vector>(self) {
         let Self(law, state, step) = self;
         let mut own = state.read::<V>(L::HISTORIES);
-        law.respond(&mut own, step);
+        law.advance(&mut own, step);
         state.write(&own, L::HISTORIES);
     }
 }

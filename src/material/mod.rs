@@ -13,6 +13,7 @@
 //! | `coulomb.rs` | return to the Mohr-Coulomb pyramid in principal stresses |
 //! | `damage/` | stiffness and strength that are lost for good |
 //! | `hardening/` | strength as a function of plastic strain, rate and temperature |
+//! | `shock.rs` | artificial viscosity |
 //! | `root.rs` | roots of scalar equations, lane by lane |
 //! | `tensor/` | symmetric tensors of batches: eigenvalues, logarithm, exponential |
 //! | `undrained.rs` | water that cannot leave the pores of a solid |
@@ -29,6 +30,7 @@ mod law;
 pub mod laws;
 pub mod parameters;
 mod root;
+mod shock;
 pub(crate) mod tensor;
 #[cfg(test)]
 mod tests;
@@ -37,6 +39,7 @@ pub mod undrained;
 pub use law::{Law, Material, State, Step};
 pub use laws::{HISTORIES, Model};
 pub use parameters::Parameters;
+pub use shock::{Shock, Viscosity};
 pub use tensor::eigen::{self, Symmetric};
 
 /// The history variable that measures plastic strain.

@@ -17,12 +17,16 @@ struct InstructionsChangeNoBit(State);
 impl Visitor for InstructionsChangeNoBit {
     fn visit(&self, example: &str, law: &impl Law) {
         for plane in [false, true] {
-            let step = Step { dt: 1e-4, cell: 0.1, size: [0.1; LANES], ..Step::rest(plane) };
-            let (mut wide, mut plain) = (self.0, self.0);
-            law.update(&mut wide, &step);
-            law.respond(&mut plain, &step);
-            for (wide, plain) in all(&wide).zip(all(&plain)) {
-                assert_eq!(wide.map(f64::to_bits), plain.map(f64::to_bits), "{example}");
+            let viscosity = Viscosity { linear: 0.2, quadratic: 2.0 };
+            let rate = std::array::from_fn(|lane| 10.0 - 3.0 * lane as f64);
+            for shock in [None, Some(Shock { viscosity, rate })] {
+                let step = Step { dt: 1e-4, cell: 0.1, size: [0.1; LANES], shock, ..Step::rest(plane) };
+                let (mut wide, mut plain) = (self.0, self.0);
+                law.update(&mut wide, &step);
+                law.advance(&mut plain, &step);
+                for (wide, plain) in all(&wide).zip(all(&plain)) {
+                    assert_eq!(wide.map(f64::to_bits), plain.map(f64::to_bits), "{example}");
+                }
             }
         }
     }

@@ -58,6 +58,7 @@ fn constant_physics<const D: usize>(problem: &Problem<D>) -> Physics<D> {
         cohesion: None,
         has_halves: false,
         f_bar: problem.f_bar,
+        viscosity: problem.viscosity,
         ties: problem.tied_surfaces,
         followed: problem.output.followed,
         control: StepControl {

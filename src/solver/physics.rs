@@ -6,7 +6,7 @@ use crate::boundary::absorbing::AbsorbingFaces;
 use crate::boundary::{BodyContacts, Collider, Contact, Leaving, Meets};
 use crate::kernel::{BoxPolicy, Coordinates, Scheme, Transfer};
 use crate::load::{self, Gravity, Load, Seepage, Water};
-use crate::material::Material;
+use crate::material::{Material, Viscosity};
 use crate::particle::chunk::{Chunk, Layout, Tag};
 use crate::particle::followed::{FirstColumns, Followed};
 use crate::particle::group::Group;
@@ -71,6 +71,8 @@ pub struct Physics<const D: usize> {
     pub has_halves: bool,
     /// Whether particles strain with the mean rate of dilation of their cell (F-bar).
     pub f_bar: bool,
+    /// Artificial viscosity, if there is any.
+    pub viscosity: Option<Viscosity>,
     /// Whether surface nodes are tied.
     pub ties: bool,
     /// Quantities that particles carry of their past.
@@ -211,9 +213,13 @@ impl<const D: usize> Physics<D> {
         load::columns(&self.loads)
     }
 
-    /// Gives a particle the history with which its material begins.
+    /// Gives a particle the history with which its material begins, and the stress of a gas.
     pub(crate) fn begin_history(&self, chunk: &mut Chunk<D>, p: usize) {
         let material = usize::from(Tag::unpack(chunk.tags()[p]).material);
+        let pressure = self.materials[material].rest_pressure();
+        if pressure > 0.0 {
+            chunk.write(Layout::<D>::STRESS, p, &[-pressure; 3]);
+        }
         for (h, value) in self.materials[material].initial_history().into_iter().enumerate() {
             chunk.column_mut(Layout::<D>::HISTORY + h)[p] = value;
         }
@@ -231,7 +237,7 @@ impl<const D: usize> Physics<D> {
         let elastic_stretch =
             self.cohesion.as_ref().map_or(scheme.elastic_stretch, |cohesion| cohesion.stretch);
         let (f_bar, shares, has_halves) = (self.f_bar, self.load_columns(), self.has_halves);
-        let coordinates = self.coordinates;
-        Scheme { coordinates, f_bar, shares, elastic_stretch, has_halves, ..scheme }
+        let (coordinates, viscosity) = (self.coordinates, self.viscosity);
+        Scheme { coordinates, f_bar, viscosity, shares, elastic_stretch, has_halves, ..scheme }
     }
 }

@@ -222,6 +222,7 @@ fn problem<const D: usize>(
         coordinates,
         boxes,
         f_bar: file.numerics.f_bar,
+        viscosity: settings::viscosity(&file.numerics),
         tied_surfaces: file.numerics.tied_surfaces,
         output,
         checkpoint: CheckpointSetup {

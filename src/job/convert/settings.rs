@@ -8,6 +8,7 @@ use crate::job::parse::source::Path;
 use crate::job::problem::*;
 use crate::job::schema::job_file::{self as file, JobFile};
 use crate::job::schema::output::Output;
+use crate::material::Viscosity;
 use crate::particle::followed::{Followed, Motion};
 use crate::text::{number, written};
 
@@ -123,6 +124,12 @@ pub(in crate::job) fn numerics(
         file::Boxes::Cell => BoxPolicy::Cell,
     };
     (transfer, boxes)
+}
+
+/// Artificial viscosity.
+pub(in crate::job) fn viscosity(numerics: &file::Numerics) -> Option<Viscosity> {
+    let file::ArtificialViscosity { linear, quadratic } = numerics.artificial_viscosity?;
+    (linear > 0.0 || quadratic > 0.0).then_some(Viscosity { linear, quadratic })
 }
 
 /// Output files.

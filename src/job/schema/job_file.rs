@@ -458,6 +458,30 @@ pub struct Numerics {
     /// cell. Left free, they take the stress of the outermost particles, and bent bodies are too soft. For elastic bodies. Off by default.
     #[serde(default)]
     pub tied_surfaces: bool,
+    /// Artificial viscosity against compression that is too quick for the cells (von Neumann and Richtmyer 1950): without, shocks ring, and
+    /// gas behind them is too cold. Off by default.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub artificial_viscosity: Option<ArtificialViscosity>,
+}
+
+/// Artificial viscosity: where material is compressed at the rate `d = -tr D > 0`, its pressure is greater by
+/// `density h d (quadratic h d + linear c)`, with cells of edge h and waves of speed c. Its work heats gas, and is plastic work in all other
+/// materials.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ArtificialViscosity {
+    /// Coefficient of the wave speed; damps the ringing behind shocks.
+    #[serde(default = "fifth")]
+    #[schemars(range(min = 0.0, max = 10.0))]
+    pub linear: f64,
+    /// Coefficient of the difference of velocity over a cell; makes strong shocks a few cells wide.
+    #[serde(default = "two")]
+    #[schemars(range(min = 0.0, max = 10.0))]
+    pub quadratic: f64,
+}
+
+fn fifth() -> f64 {
+    0.2
 }
 
 /// Transfer of velocity between particles and grid.

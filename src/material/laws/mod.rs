@@ -14,7 +14,7 @@
 //! | `drucker_prager.rs` | sand: Drucker-Prager yield |
 //! | `mohr_coulomb.rs` | soil, rock: Mohr-Coulomb yield |
 //! | `cap/` | clay, snow and other matter that yields under pressure alone |
-//! | `flow/` | fluid, dense granular flow |
+//! | `flow/` | fluid, gas, dense granular flow |
 use schemars::JsonSchema;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
@@ -158,6 +158,8 @@ materials! {
     MuI(flow::mu_i::MuI),
     /// Weakly compressible Newtonian fluid.
     Fluid(flow::fluid::Fluid),
+    /// Ideal or stiffened gas: `p = (γ - 1) ρ e - γ p_∞`.
+    Gas(flow::gas::Gas),
 }
 
 #[cfg(test)]

@@ -116,6 +116,7 @@ impl<const D: usize> GivenBoxes<D> {
             cohesion: None,
             has_halves: false,
             f_bar: false,
+            viscosity: None,
             ties: false,
             followed: Followed::default(),
             control: StepControl { cfl: 1.0, dt_max: None, growth: 1.0 },

@@ -126,7 +126,9 @@ impl<const D: usize> Solver<D> {
             columns[Layout::<D>::VELOCITY..][..D].copy_from_slice(&source.velocity);
             columns[Layout::<D>::MASS] = source.mass;
             columns[Layout::<D>::HALF] = 0.5 * source.spacing;
-            let history = physics.materials[usize::from(source.material)].initial_history();
+            let material = &physics.materials[usize::from(source.material)];
+            columns[Layout::<D>::STRESS..][..3].fill(-material.rest_pressure());
+            let history = material.initial_history();
             columns[Layout::<D>::HISTORY..][..history.len()].copy_from_slice(&history);
             let tag = Tag { material: source.material, body: source.body, level: source.level }.pack();
             for layer in layers {
