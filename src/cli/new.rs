@@ -50,6 +50,7 @@ const TEMPLATES: &[Template] = templates![
     "clay_footing";
     "cone_penetration";
     "dam_break";
+    "sod";
     "snowball";
     "cantilever";
     "thick_cylinder";

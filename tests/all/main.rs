@@ -36,6 +36,7 @@ mod report;
 mod rigid_contact;
 mod rings;
 mod seepage;
+mod shocks;
 mod soak;
 mod softening;
 mod sources;

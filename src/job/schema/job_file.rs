@@ -471,17 +471,21 @@ pub struct Numerics {
 #[serde(deny_unknown_fields)]
 pub struct ArtificialViscosity {
     /// Coefficient of the wave speed; damps the ringing behind shocks.
-    #[serde(default = "fifth")]
+    #[serde(default = "half")]
     #[schemars(range(min = 0.0, max = 10.0))]
     pub linear: f64,
     /// Coefficient of the difference of velocity over a cell; makes strong shocks a few cells wide.
-    #[serde(default = "two")]
+    #[serde(default = "four")]
     #[schemars(range(min = 0.0, max = 10.0))]
     pub quadratic: f64,
 }
 
-fn fifth() -> f64 {
-    0.2
+fn half() -> f64 {
+    0.5
+}
+
+fn four() -> f64 {
+    4.0
 }
 
 /// Transfer of velocity between particles and grid.

@@ -5,6 +5,7 @@
 //! | `mod.rs` | faces, angles of friction, long runs |
 //! | `colliders.rs` | thin colliders, those that overlap bodies, those outside the domain |
 //! | `damage.rs` | crack bands that are too wide |
+//! | `shock.rs` | gas without what its shocks need |
 //! | `stretch.rs` | elastic bodies that are stretched further than particles follow |
 //! | `units.rs` | properties that no matter has |
 use crate::job::Problem;
@@ -15,6 +16,7 @@ use crate::text::{count, excerpt, number};
 
 mod colliders;
 mod damage;
+mod shock;
 mod stretch;
 mod units;
 
@@ -33,6 +35,7 @@ pub fn warnings<const D: usize>(problem: &Problem<D>, steps: f64) -> Vec<String>
     saturated(problem, &mut all);
     colliders::look(problem, &mut all);
     damage::look(problem, &mut all);
+    shock::look(problem, &mut all);
     stretch::look(problem, &mut all);
     units::look(problem, steps, &mut all);
     if steps >= MANY_STEPS {

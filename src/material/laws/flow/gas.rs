@@ -181,3 +181,110 @@ impl Law for Gas {
         Some([0.0; 3])
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::material::driver::Point;
+    use crate::material::{Shock, Viscosity};
+    use crate::simd::{LANES, Lanes};
+
+    fn gas(text: &str) -> Gas {
+        match text.parse() {
+            Ok(crate::material::Parameters::Gas(parameters)) => Gas::new(&parameters, 1.2),
+            other => panic!("{other:?}"),
+        }
+    }
+
+    /// `(p + p_∞) J^γ` is constant whatever path leads there, and the energy is the work that was done.
+    #[test]
+    fn compression_without_heat_is_adiabatic() {
+        for (text, gamma, start, stiffening) in [
+            ("model = 'gas', pressure = 1e5", 1.4, 1e5, 0.0),
+            ("model = 'gas', pressure = 1e5, adiabatic_index = 4.4, stiffening = 6e8", 4.4, 1e5, 6e8),
+        ] {
+            let law = gas(text);
+            let mut point = Point::new(&law);
+            assert!((point.stress[0] / -start - 1.0).abs() < 1e-9, "{point:?}");
+            for strains in [[-0.7, 0.0, 0.0], [0.1, 0.3, -0.2], [0.2, 0.5, 0.4]] {
+                for _ in 0..10 {
+                    point.stretch(strains.map(|strain| 0.1 * strain));
+                }
+                let volume =
+                    libm::pow(eigen::determinant(&point.elastic.map(Lanes::splat)).to_array()[0], 0.5);
+                let exact = (start + stiffening) * libm::pow(volume, -gamma) - stiffening;
+                let scale = exact.abs() + stiffening;
+                for normal in &point.stress[..3] {
+                    assert!((normal / volume + exact).abs() < 1e-12 * scale, "{normal} at {volume}: {exact}");
+                }
+                let energy = |volume: f64| {
+                    (start + stiffening) * libm::pow(volume, 1.0 - gamma) / (gamma - 1.0)
+                        + stiffening * volume
+                };
+                let gain = energy(volume) - energy(1.0);
+                assert!((point.energy() - gain).abs() < 1e-12 * energy(1.0), "{} {gain}", point.energy());
+                let speed = (gamma * (exact + stiffening) * volume / 1.2).sqrt();
+                assert!((point.wave_speed / speed - 1.0).abs() < 1e-12, "{} {speed}", point.wave_speed);
+            }
+            assert_eq!((point.history[ENTROPY], point.work), (0.0, 0.0));
+        }
+    }
+
+    /// The work of the artificial pressure is what the energy grows by, and `p = (γ - 1) ρ e - γ p_∞` holds.
+    #[test]
+    fn artificial_viscosity_heats() {
+        for (text, gamma, stiffening) in [
+            ("model = 'gas', pressure = 1e5", 1.4, 0.0),
+            ("model = 'gas', pressure = 1e3, adiabatic_index = 4.4, stiffening = 1e6", 4.4, 1e6),
+        ] {
+            let law = gas(text);
+            let viscosity = Viscosity { linear: 0.5, quadratic: 4.0 };
+            let rate = std::array::from_fn(|lane| 20.0 - 100.0 * lane as f64);
+            let still = Step { dt: 1e-4, cell: 0.1, ..Step::rest(false) };
+            let step = Step { shock: Some(Shock { viscosity, rate }), ..still };
+            let stretch = Lanes::splat(0.81);
+            let zero = Lanes::splat(0.0);
+            let mut cold = State::new([stretch, stretch, stretch, zero, zero, zero]);
+            cold.history[ENTROPY] = Lanes::splat(0.1);
+            let mut hot = cold;
+            law.advance(&mut cold, &still);
+            law.advance(&mut hot, &step);
+            let energies = [&cold, &hot].map(|state| law.energy(state, false).to_array());
+            let pressures = [&cold, &hot].map(|state| state.stress[0].to_array());
+            let [slow, quick] = [&cold, &hot].map(|state| state.wave_speed.to_array());
+            let after = {
+                let mut again = hot;
+                law.advance(&mut again, &still);
+                (again.stress[0].to_array(), again.wave_speed.to_array())
+            };
+            for lane in 0..LANES {
+                let closing = (-rate[lane]).max(0.0);
+                let heat = energies[1][lane] - energies[0][lane];
+                let artificial = after.0[lane] - pressures[1][lane];
+                let scale = energies[0][lane].abs() + 1.2 * slow[lane] * slow[lane];
+                assert!((heat - artificial * closing * 1e-4).abs() < 1e-12 * scale, "{heat} {artificial}");
+                let jump = 0.1 * closing;
+                let exact = 1.2 * jump * (4.0 * jump + 0.5 * slow[lane]);
+                assert!((artificial - exact).abs() < 1e-11 * scale, "{artificial} {exact}");
+                let warmed = (pressures[0][lane] - after.0[lane]) / (gamma - 1.0);
+                assert!((warmed - heat).abs() < 1e-11 * scale, "{warmed} {heat}");
+                let damping = 0.5 * after.1[lane] + 8.0 * jump;
+                let bound = if closing > 0.0 { damping + damping.hypot(after.1[lane]) } else { slow[lane] };
+                assert!((quick[lane] / bound - 1.0).abs() < 1e-9, "{} {bound}", quick[lane]);
+            }
+            assert!(stiffening >= 0.0 && hot.work.to_array() == [0.0; LANES]);
+        }
+    }
+
+    /// Under any even pressure the gas keeps its density; other stresses it cannot have.
+    #[test]
+    fn pressure_at_the_start_is_energy() {
+        let law = gas("model = 'gas', pressure = 1e5");
+        let mut history = [0.0; HISTORIES];
+        let strain = Law::strain_under(&law, [-3e5; 3], None, &mut history);
+        assert_eq!(strain, Some([0.0; 3]));
+        assert!((history[ENTROPY] - libm::log(3.0)).abs() < 1e-15);
+        assert_eq!(Law::strain_under(&law, [-3e5, -2e5, -3e5], None, &mut history), None);
+        assert_eq!(Law::strain_under(&law, [0.0; 3], None, &mut history), None);
+    }
+}
