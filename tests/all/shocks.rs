@@ -152,24 +152,32 @@ const NOH: &str = "[[materials]]\nname = 'gas'\ndensity = 1\nmodel = 'gas'\nadia
 #[test]
 fn nohs_gas_comes_to_rest_at_a_wall() {
     let numerics = "artificial_viscosity = {}\ntransfer = 'flip'\nflip = 1.0";
-    let mut changes = Vec::new();
+    let mut losses = Vec::new();
     for cfl in [0.5, 0.25] {
         let (history, state) = Strip { cells: 100, numerics, matter: NOH, end: 0.6, cfl }.run();
         let piece = [0.06, 0.16];
         let [density, pressure, velocity] = [1, 2, 3].map(|value| mean(&state, piece, value));
+        let at_wall = mean(&state, [0.0, 0.02], 1);
         println!(
-            "density {density}, pressure {pressure}, velocity {velocity}; at the wall {}",
-            mean(&state, [0.0, 0.02], 1)
+            "density {density}, pressure {pressure}, velocity {velocity}; density {at_wall} at the wall"
         );
         assert!((density / 4.0 - 1.0).abs() < 0.02, "density {density}");
         assert!((pressure * 0.75 - 1.0).abs() < 0.01, "pressure {pressure}");
         assert!(velocity.abs() < 0.01, "velocity {velocity}");
+        assert!(at_wall > 2.4, "density {at_wall} at the wall");
         let front = state.iter().filter(|p| p[1] > 2.5).map(|p| p[0]).fold(0.0, f64::max);
         assert!((front - 0.2).abs() < 0.015, "shock at {front}");
-        changes.push(change_of_energy(&history, 0.5 * 0.04));
+        let kinetic = 0.5 * 0.04;
+        let change = change_of_energy(&history, kinetic);
+        assert!(change < 0.012, "energy changes by {change}");
+        // Once the shock is steady, FLIP takes energy by the step.
+        let (first, _) = history.at("kinetic_energy", 0.3);
+        let row = history.column("time").iter().position(|time| *time == first).expect("a row");
+        let sum = |row: usize| history.column("kinetic_energy")[row] + history.column("elastic_energy")[row];
+        losses.push((sum(row) - sum(history.column("time").len() - 1)) / kinetic);
     }
-    println!("changes of the energy: {changes:?}");
-    assert!(changes[0] < 0.01 && changes[1] < changes[0], "{changes:?}");
+    println!("parts of the energy lost in the second half: {losses:?}");
+    assert!(losses[0] < 0.006 && losses[1] < 0.65 * losses[0], "{losses:?}");
 }
 
 /// Gas of one pressure and two densities, one of them by its stress at the start, is at rest.
@@ -187,7 +195,10 @@ fn gas_of_one_pressure_is_at_rest() {
         assert!((density / exact - 1.0).abs() < 1e-9, "density {density} at {x}");
         assert!((pressure - 2.0).abs() < 1e-9 && velocity.abs() < 1e-9, "{pressure} {velocity} at {x}");
     }
-    assert!(history.last("elastic_energy").abs() < 1e-9);
+    // More than that of their materials at the start: (2 - 0.1) Pa / 0.4 on half of the volume.
+    for energy in history.column("elastic_energy") {
+        assert!((energy - 1.9 / 0.4 * 0.5 * 0.04).abs() < 1e-9, "{energy}");
+    }
 }
 
 /// A hot disk in cold gas, with a tree that follows the shock.
