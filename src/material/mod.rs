@@ -12,6 +12,7 @@
 //! | `angle.rs` | angles of friction and dilation that may soften |
 //! | `coulomb.rs` | return to the Mohr-Coulomb pyramid in principal stresses |
 //! | `damage/` | stiffness and strength that are lost for good |
+//! | `eos.rs` | equation of state of metals |
 //! | `hardening/` | strength as a function of plastic strain, rate and temperature |
 //! | `shock.rs` | artificial viscosity |
 //! | `root.rs` | roots of scalar equations, lane by lane |
@@ -24,6 +25,7 @@ mod angle;
 mod coulomb;
 pub mod damage;
 pub mod driver;
+pub mod eos;
 mod hardening;
 pub mod initial;
 mod law;

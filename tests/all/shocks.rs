@@ -1,6 +1,9 @@
-//! Shocks in gas through the whole program: Sod's tube against the exact solution of its Riemann problem,
-//! Noh's problem, gas at rest, and a piston.
+//! Shocks through the whole program: Sod's tube against the exact solution of its Riemann problem, Noh's
+//! problem, gas at rest, a blast; plates of metal, and metal that opens.
 use std::path::Path;
+
+use agimp::material::Parameters;
+use agimp::material::driver::Point;
 
 use crate::common::history::History;
 use crate::common::launch::{run, succeed};
@@ -221,4 +224,76 @@ fn same_bits_on_any_ranks_and_across_restart() {
         let history = History::read(directory, "blast");
         assert!(history.last("particles") > 1.2 * history.column("particles")[0], "nothing was split");
     });
+}
+
+/// A plate of copper strikes a rigid wall, which is half of an impact of two such plates: behind the shock, of the
+/// speed `c₀ + s u`, are the states of Rankine and Hugoniot.
+#[test]
+fn a_plate_that_strikes_a_wall_has_the_states_behind_its_shock() {
+    let [density, sound, slope] = [8930.0, 3940.0, 1.489];
+    let length = 0.01;
+    for speed in [500.0, 1000.0] {
+        let shock = sound + slope * speed;
+        let height = length / 50.0;
+        let end = 0.6 * length / shock;
+        let job = format!(
+            "version = 1\ndimension = 2\ndomain = {{ size = [{length}, {height}], root_edge = {height} }}\n\
+             boundaries = {{ x_min.kind = 'slip', x_max.kind = 'separating', y_min.kind = 'slip', y_max.kind = 'slip' }}\n\
+             numerics = {{ artificial_viscosity = {{}} }}\n\
+             [[materials]]\nname = 'copper'\ndensity = {density}\nmodel = 'von_mises'\nyoung = 1.24e11\npoisson = 0.34\nyield_stress = 1e6\n\
+             eos = {{ kind = 'mie_gruneisen', sound_speed = {sound}, slope = {slope}, gruneisen = 2.02 }}\n\
+             [[bodies]]\nname = 'plate'\nmaterial = 'copper'\nvelocity = [-{speed}, 0]\n\
+             shape = {{ kind = 'box', min = [0, 0], max = [{length}, {height}] }}\n\
+             [time]\nend = {end}\n[history]\nevery_steps = 5\n\
+             [output]\npicture = false\nfields = ['velocity', 'density', 'pressure']\n"
+        );
+        let directory = tempfile::tempdir().expect("temporary directory");
+        let path = directory.path().join("strip.toml");
+        std::fs::write(&path, job).expect("job");
+        succeed(&mut run(directory.path(), 1, 1, &path, &["--quiet"]));
+        let (history, state) = (History::read(directory.path(), "strip"), state(directory.path()));
+        let time = history.last("time");
+        let front = (shock - speed) * time;
+        let exact = [density * shock / (shock - speed), density * shock * speed];
+        for (value, exact) in [(1, exact[0]), (2, exact[1])] {
+            let found = mean(&state, [0.3 * front, 0.8 * front], value);
+            assert!((found / exact - 1.0).abs() < 0.01, "{speed} m/s: {found} for {exact}");
+        }
+        let reached = state.iter().filter(|p| p[2] > 0.5 * exact[1]).map(|p| p[0]).fold(0.0, f64::max);
+        let found = reached / time + speed;
+        assert!((found / shock - 1.0).abs() < 0.01, "{speed} m/s: a shock of {found} for {shock}");
+        let change = change_of_energy(&history, history.column("kinetic_energy")[0]);
+        assert!(change < 0.01, "{speed} m/s: energy changes by {change}");
+    }
+}
+
+/// Metal with a tension limit opens there, bears nothing while it is open, and pressure again once it has closed.
+#[test]
+fn metal_opens_at_its_tension_limit() {
+    let text = "model = 'von_mises', young = 1.24e11, poisson = 0.34, yield_stress = 9e7, \
+        eos = {kind = 'mie_gruneisen', sound_speed = 3940.0, slope = 1.489, gruneisen = 2.02, tension_limit = 1.2e9}";
+    let material = text.parse::<Parameters>().expect("a model").build(8930.0);
+    let mut point = Point::new(material.as_ref());
+    let mean = |point: &Point<'_>| (point.stress[0] + point.stress[1] + point.stress[2]) / 3.0;
+    let (mut greatest, mut booked) = (0.0_f64, 0.0);
+    for _ in 0..200 {
+        let before = point.work;
+        point.stretch([1e-4, 0.0, 0.0]);
+        greatest = greatest.max(mean(&point));
+        if point.history[1] > 0.0 && booked == 0.0 {
+            booked = point.work - before;
+        }
+    }
+    assert!(greatest > 1.18e9 && greatest <= 1.2e9 * 1.02, "{greatest}");
+    assert!(point.stress.iter().all(|stress| stress.abs() < 1.0), "{point:?}");
+    // p²/2K of the volume, and a little of the shear.
+    let energy = 0.5 * 1.2e9 * 1.2e9 / (8930.0 * 3940.0 * 3940.0);
+    assert!((booked / energy - 1.0).abs() < 0.1, "{booked} for {energy}");
+    let opened = point.history[1];
+    assert!((opened - 0.02).abs() < 2e-3, "{opened}");
+    for _ in 0..210 {
+        point.stretch([-1e-4, 0.0, 0.0]);
+        assert!(mean(&point) < 1e6, "{point:?}");
+    }
+    assert!(point.history[1] == 0.0 && mean(&point) < -1e8, "{point:?}");
 }

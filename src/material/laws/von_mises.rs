@@ -11,6 +11,7 @@ use serde::{Deserialize, Serialize};
 use super::Model;
 use super::hencky::Hencky;
 use crate::material::damage::{Ductile, Failure};
+use crate::material::eos::{Eos, Shocked};
 use crate::material::hardening::{Curve, Flow, Hardening};
 use crate::material::parameters::OutOfRange;
 use crate::material::root::Function;
@@ -48,6 +49,9 @@ pub struct Parameters {
     #[serde(default = "one")]
     #[schemars(range(min = 0.05, max = 10.0))]
     pub rate_exponent: f64,
+    /// Equation of state for the pressure, with the heat that shocks make; by default pressure is linear in the logarithm of the volume.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub eos: Option<Eos>,
     /// Failure by plastic strain; by default there is none.
     #[serde(default)]
     pub damage: Option<Failure>,
@@ -132,6 +136,11 @@ impl VonMises {
         &self.solid
     }
 
+    /// Temperature gained per plastic work, K/(J/m³); 0 for laws without temperatures.
+    pub(in crate::material) fn warming(&self) -> f64 {
+        self.curve.heat()
+    }
+
     /// Temperature of the undeformed material, K, for laws with one.
     pub(in crate::material) fn temperature(&self) -> Option<f64> {
         self.curve.temperature()
@@ -149,14 +158,16 @@ impl Model for VonMises {
 
     fn boxed(p: &Parameters, density: f64) -> Box<dyn material::Material> {
         let metal = Self::new(p, density);
-        match &p.damage {
-            Some(failure) => Box::new(Ductile::new(metal, failure, &p.hardening)),
-            None => Box::new(metal),
+        match (&p.damage, &p.eos) {
+            (Some(failure), _) => Box::new(Ductile::new(metal, failure, &p.hardening)),
+            (None, Some(eos)) => Box::new(Shocked::new(metal, eos, &p.hardening)),
+            (None, None) => Box::new(metal),
         }
     }
 
     fn check(p: &Parameters) -> Result<(), OutOfRange> {
         p.hardening.check(p.yield_stress)?;
+        p.eos.map_or(Ok(()), |eos| eos.check(p.damage.is_some()))?;
         p.damage.map_or(Ok(()), |failure| failure.check(&p.hardening))
     }
 
@@ -189,6 +200,11 @@ impl Model for VonMises {
             "model = 'von_mises', young = 1e6, poisson = 0.3, yield_stress = 1e4, \
              hardening = {kind = 'ludwik', modulus = 2e4, exponent = 0.3}, \
              damage = {kind = 'johnson_cook', d1 = 0.05, d2 = 0.2, d3 = -2.0, d4 = 0.01}",
+            "model = 'von_mises', young = 1e6, poisson = 0.3, yield_stress = 1e4, \
+             eos = {kind = 'mie_gruneisen', sound_speed = 30.0, slope = 1.5, gruneisen = 2.0, tension_limit = 3e4}",
+            "model = 'von_mises', young = 1e6, poisson = 0.3, yield_stress = 1e4, \
+             hardening = {kind = 'johnson_cook', modulus = 3e4, exponent = 0.31, melting_temperature = 1356.0, specific_heat = 383.0}, \
+             eos = {kind = 'mie_gruneisen', sound_speed = 30.0, slope = 1.5, gruneisen = 2.0}",
         ]
     }
 }
