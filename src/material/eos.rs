@@ -67,7 +67,7 @@ pub enum Eos {
 }
 
 impl Eos {
-    /// Checks that a metal with this hardening, damage or viscosity may have it.
+    /// Checks that a metal may have it.
     pub(super) fn check(self, has_damage: bool) -> Result<(), OutOfRange> {
         let Self::MieGruneisen { sound_speed, .. } = self;
         if !has_damage {

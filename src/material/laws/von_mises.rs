@@ -49,7 +49,8 @@ pub struct Parameters {
     #[serde(default = "one")]
     #[schemars(range(min = 0.05, max = 10.0))]
     pub rate_exponent: f64,
-    /// Equation of state for the pressure, with the heat that shocks make; by default pressure is linear in the logarithm of the volume.
+    /// Equation of state for the pressure, with the heat that shocks make; by default pressure is linear in
+    /// the logarithm of the volume.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub eos: Option<Eos>,
     /// Failure by plastic strain; by default there is none.
