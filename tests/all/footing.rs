@@ -27,6 +27,23 @@ fn clay_bears_what_limit_analysis_says() {
     assert!(without > 2.0 * with, "it locks: {without}");
 }
 
+/// Pressed fast, soil with friction whose water cannot leave has the strength p0 sin φ, and bears Prandtl's load of
+/// it: on cells of B/16, twice those of the job.
+#[test]
+fn undrained_soil_bears_the_limit_of_its_undrained_strength() {
+    let directory = tempfile::tempdir().expect("temporary directory");
+    let job = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("jobs/undrained_footing.toml");
+    let coarse = ["--quiet", "--end", "0.16", "--set", "tree.regions=[]"];
+    succeed(&mut run(directory.path(), 1, 2, &job, &coarse));
+    let history = History::read(directory.path(), "undrained_footing");
+    let rows = history.column("time").iter().zip(history.column("force_footing_y"));
+    let strength = 2e4 * 30_f64.to_radians().sin();
+    let late: Vec<f64> = rows.filter(|(time, _)| **time > 0.14).map(|(_, f)| f / (0.5 * strength)).collect();
+    let limit = late.iter().sum::<f64>() / late.len() as f64 / (2.0 + std::f64::consts::PI);
+    println!("B/16: {:+.1} %", 100.0 * (limit - 1.0));
+    assert!((1.0..1.08).contains(&limit), "limit over Prandtl's: {limit}");
+}
+
 /// Soft clay of two strengths, one in the other, is pressed across level jumps.
 #[test]
 fn f_bar_gives_the_same_on_any_ranks_and_across_restart() {
