@@ -4,9 +4,11 @@ use std::path::{Path, PathBuf};
 
 use super::hdf5_file::{FileError, Reader};
 use super::picture::source;
+use super::revolve::{self, Revolve, Turn};
 use super::snapshot::content::fields::Values;
 use super::snapshot::intact::checked::Checked;
 use super::snapshot::{Header, PointField};
+use crate::kernel::Coordinates;
 
 /// Particles of an output or checkpoint file.
 pub struct Frame {
@@ -73,6 +75,35 @@ impl Frame {
         })
     }
 
+    /// Whether its bodies are those of revolution.
+    pub fn is_of_revolution(&self) -> bool {
+        self.header.scalars.coordinates() == Coordinates::Axisymmetric
+    }
+
+    /// Its bodies of revolution in space: each particle next to itself about the axis, with the same id.
+    ///
+    /// # Errors
+    /// In words: see [`revolve::copies`].
+    pub fn revolved(mut self, revolve: Revolve) -> Result<Self, String> {
+        let sections = self.positions.iter().map(|x| x[0]).zip(self.half_widths.iter().copied());
+        let copies = revolve::copies(&self.header, sections, revolve)?;
+        for (_, values) in &mut self.fields {
+            *values = match values {
+                Values::Id(ids) => Values::Id(copies.iter().map(|&(p, _)| ids[p]).collect()),
+                Values::Integer(all) => Values::Integer(copies.iter().map(|&(p, _)| all[p]).collect()),
+                Values::Single(all, width) => {
+                    let all: Vec<f64> = all.iter().copied().map(f64::from).collect();
+                    Values::Real(turned(&copies, &all, *width), *width)
+                }
+                Values::Real(all, width) => Values::Real(turned(&copies, all, *width), *width),
+            };
+        }
+        self.positions = copies.iter().map(|&(p, turn)| turn.place(self.positions[p])).collect();
+        self.half_widths = copies.iter().map(|&(p, _)| self.half_widths[p]).collect();
+        self.header.dimension = 3;
+        Ok(self)
+    }
+
     /// Lower and upper corner of the domain, m.
     pub fn domain(&self) -> [[f64; 3]; 2] {
         let low = |axis: usize| self.header.origin.get(axis).copied().unwrap_or(0.0);
@@ -80,6 +111,20 @@ impl Frame {
             |axis: usize| self.header.roots.get(axis).map_or(0.0, |&n| n as f64 * self.header.root_edge);
         [std::array::from_fn(low), std::array::from_fn(|axis| low(axis) + edge(axis))]
     }
+}
+
+/// Numbers of copies of particles; rows of three are vectors, of six tensors.
+fn turned(copies: &[(usize, Turn)], all: &[f64], width: usize) -> Vec<f64> {
+    let width = width.max(1);
+    let row = |&(p, turn): &(usize, Turn)| {
+        let own = &all[width * p..][..width];
+        match width {
+            3 => turn.vector(std::array::from_fn(|i| own[i])).to_vec(),
+            6 => turn.tensor(std::array::from_fn(|i| own[i])).to_vec(),
+            _ => own.to_vec(),
+        }
+    };
+    copies.iter().flat_map(row).collect()
 }
 
 /// The fields that a file shows, in the order of [`PointField::ALL`].

@@ -9,6 +9,7 @@
 //! | [`series`] | the index of the outputs of a run |
 //! | [`frame`] | particles and leaves of an output, for viewers and exports |
 //! | [`picture`], [`movie`], `chart.rs` | pictures of particles and plots of numbers |
+//! | [`revolve`] | bodies of revolution in space |
 //! | [`export`] | outputs for other programs |
 //! | [`log`] | history, telemetry, progress |
 //! | [`particles`], [`raster`] | tables of particles and rasters |
@@ -23,6 +24,7 @@ pub mod movie;
 pub mod particles;
 pub mod picture;
 pub mod raster;
+pub mod revolve;
 pub mod series;
 pub mod snapshot;
 pub(crate) mod whole_file;

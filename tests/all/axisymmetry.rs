@@ -4,7 +4,7 @@ use std::f64::consts::{PI, TAU};
 use std::path::Path;
 
 use crate::common::history::History;
-use crate::common::launch::{run, succeed};
+use crate::common::launch::{agimp, run, succeed};
 use crate::common::restart;
 use crate::common::scenarios::{Scenario, alone};
 use agimp::job::{AnyProblem, Problem, parse};
@@ -258,4 +258,96 @@ fn results_are_the_same_on_any_ranks_and_across_a_restart() {
         assert!((history.last("mass") / mass - 1.0).abs() < 1e-12, "{}", history.last("mass"));
     });
     assert_eq!(looks, 3);
+}
+
+/// Pictures, particles and surfaces in space: copies of each particle stand around the axis at its radius with the
+/// velocity of that place, a picture shows the body, and the surface encloses its volume. Jobs in the plane are
+/// refused.
+#[test]
+fn bodies_are_revolved_for_other_programs_and_pictures() {
+    let text = job(
+        [0.5, 1.0],
+        "[tree]\nbase_level = 2\n[[bodies]]\nname = 'cylinder'\nmaterial = 'rubber'\nvelocity = ['-2 * x', 0.5]\n\
+         shape = { kind = 'box', min = [0, 0.25], max = [0.25, 0.75] }\n\
+         [[colliders]]\nname = 'plate'\nshape = { kind = 'box', min = [-0.4, 0], max = [0.4, 0.1] }\n[time]\nend = 1e-6\n",
+    );
+    let directory = tempfile::tempdir().expect("temporary directory");
+    let path = |name: &str| directory.path().join(name);
+    std::fs::write(path("rod.toml"), &text).expect("job");
+    succeed(&mut run(directory.path(), 1, 1, &path("rod.toml"), &["--quiet"]));
+    let output = "out/rod/rod_000000.hdf";
+    let exported =
+        |arguments: &[&str]| succeed(agimp(directory.path()).arg("export").arg(output).args(arguments));
+    exported(&["--csv", "--fields", "id,velocity", "--out", "plane.csv"]);
+    exported(&["--csv", "--fields", "id,velocity", "--revolve", "--out", "space.csv"]);
+    let rows = |name: &str| -> Vec<Vec<f64>> {
+        let text = std::fs::read_to_string(path(name)).expect("a table");
+        let row = |line: &str| line.split(',').map(|value| value.parse().expect("a number")).collect();
+        text.lines().skip(1).map(row).collect()
+    };
+    let (plane, space) = (rows("plane.csv"), rows("space.csv"));
+    assert!(space.len() > 20 * plane.len(), "{} of {}", space.len(), plane.len());
+    // x, y, z, radius, id, velocity.
+    for row in &space {
+        let own = plane.iter().find(|own| own[4] == row[4]).expect("its particle");
+        let [x, y, z] = [row[0], row[1], row[2]];
+        assert!((x.hypot(y) - own[0]).abs() < 1e-14 && z == own[1] && row[3] == own[3], "{row:?} {own:?}");
+        for (v, exact) in row[5..8].iter().zip([-2.0 * x, -2.0 * y, 0.5]) {
+            assert!((v - exact).abs() < 1e-3, "{row:?}");
+        }
+    }
+    let [mean_x, mean_y] = [0, 1].map(|a| space.iter().map(|row| row[a]).sum::<f64>() / space.len() as f64);
+    assert!(mean_x.abs() < 1e-12 && mean_y.abs() < 1e-12, "all around");
+    exported(&["--csv", "--fields", "id", "--revolve=open", "--out", "open.csv"]);
+    assert!(rows("open.csv").iter().all(|row| row[0] < 0.0 || row[1] > 0.0), "a quarter is open");
+
+    exported(&["--surface", "obj", "--out", "rod.surface.obj"]);
+    let mesh = std::fs::read_to_string(path("rod.surface.obj")).expect("a surface");
+    let of = |kind: &str| {
+        mesh.lines().filter_map(|line| line.strip_prefix(kind)).map(str::to_owned).collect::<Vec<_>>()
+    };
+    let corners: Vec<[f64; 3]> = of("v ")
+        .iter()
+        .map(|line| {
+            let numbers: Vec<f64> = line.split(' ').map(|number| number.parse().expect("a number")).collect();
+            [numbers[0], numbers[1], numbers[2]]
+        })
+        .collect();
+    let volume: f64 = of("f ")
+        .iter()
+        .map(|line| {
+            let corner = |text: &str| {
+                corners[text.split('/').next().expect("a corner").parse::<usize>().expect("a number") - 1]
+            };
+            let [a, b, c]: [[f64; 3]; 3] =
+                std::array::from_fn(|i| corner(line.split(' ').nth(i).expect("three")));
+            (a[0] * (b[1] * c[2] - b[2] * c[1])
+                + a[1] * (b[2] * c[0] - b[0] * c[2])
+                + a[2] * (b[0] * c[1] - b[1] * c[0]))
+                / 6.0
+        })
+        .sum();
+    let exact = PI * 0.25 * 0.25 * 0.5;
+    assert!((volume / exact - 1.0).abs() < 0.05, "{volume} m³ for {exact}");
+
+    let picture = |arguments: &[&str]| {
+        let mut command = agimp(directory.path());
+        command.arg("plot").args([output, "--colour", "speed"]).args(arguments);
+        command
+    };
+    succeed(&mut picture(&["--out", "plane.png"]));
+    succeed(&mut picture(&["--revolve", "--vectors", "velocity", "--out", "space.png"]));
+    let [plane, space] = ["plane.png", "space.png"].map(|name| std::fs::read(path(name)).expect("a picture"));
+    assert!(plane != space && space.len() > 10_000);
+    let refused = picture(&["--revolve", "--tree"]).output().expect("starts");
+    assert_eq!(refused.status.code(), Some(2));
+    std::fs::write(path("plane.toml"), text.replace("geometry = 'axisymmetric'\n", "")).expect("job");
+    succeed(&mut run(directory.path(), 1, 1, &path("plane.toml"), &["--quiet"]));
+    for arguments in [&["plot", "--revolve"][..], &["export", "--vtp", "--revolve"]] {
+        let mut command = agimp(directory.path());
+        let output = command.args(arguments).arg("out/plane/plane_000000.hdf").output().expect("starts");
+        let told = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(2), "{told}");
+        assert!(told.contains("found no bodies of revolution"), "{told}");
+    }
 }

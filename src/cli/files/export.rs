@@ -5,10 +5,11 @@ use crate::io::export::points::{self, Format};
 use crate::io::export::surface::{MeshFormat, Surface};
 use crate::io::export::tree::Tree;
 use crate::io::frame::{Frame, shown_in};
+use crate::io::revolve::Revolve;
 use crate::io::snapshot::PointField;
 use crate::text::{bytes, count};
 use std::io::Write;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Arguments of `agimp export`.
 #[derive(Debug, clap::Args)]
@@ -32,6 +33,11 @@ pub struct Arguments {
     /// The leaves of the tree as VTK's HyperTreeGrid (XML), with the hierarchy: for ParaView 5.10 and later.
     #[arg(long, group = "format")]
     htg: bool,
+    /// Bodies of revolution in space (jobs with geometry = "axisymmetric"), whole or with a quarter cut out. Surfaces
+    /// are always in space.
+    #[arg(long, value_name = "open|whole", num_args = 0..=1, require_equals = true, default_missing_value = "whole",
+        value_parser = str::parse::<Revolve>, conflicts_with = "htg")]
+    revolve: Option<Revolve>,
     /// With --surface: only the body of this name.
     #[arg(long, requires = "surface", value_name = "NAME")]
     body: Option<String>,
@@ -78,7 +84,9 @@ pub(in crate::cli) fn execute(arguments: &Arguments) -> Result<(), Failure> {
         Some(mesh) => mesh.ending(),
         None => format.ending(),
     };
-    let outs = super::outs(arguments.out.as_deref(), &given.files, &[ending], "")?;
+    // A name that a user chooses need not say that it is a surface.
+    let short = ending.rsplit('.').next().unwrap_or(ending);
+    let outs = super::outs(arguments.out.as_deref(), &given.files, &[ending, short], "")?;
     for (file, out) in given.files.iter().zip(outs) {
         let made = if arguments.htg {
             let tree = Tree::read(file).map_err(failed)?;
@@ -86,6 +94,8 @@ pub(in crate::cli) fn execute(arguments: &Arguments) -> Result<(), Failure> {
             format!("{} leaves", count(tree.leaf_count() as u64))
         } else if let Some(format) = arguments.surface {
             let frame = Frame::read(file, &[PointField::Body], false).map_err(failed)?;
+            let whole = frame.is_of_revolution().then_some(Revolve::Whole);
+            let frame = revolved(frame, arguments.revolve.or(whole), file)?;
             let surface = Surface::of(&frame, arguments.body.as_deref())
                 .map_err(|reason| Failure::Usage(format!("{}: {reason}", file.display())))?;
             surface.write(format, &out).map_err(failed)?;
@@ -96,6 +106,7 @@ pub(in crate::cli) fn execute(arguments: &Arguments) -> Result<(), Failure> {
                 None => shown_in(file).map_err(failed)?,
             };
             let frame = Frame::read(file, &fields, true).map_err(failed)?;
+            let frame = revolved(frame, arguments.revolve, file)?;
             points::write(&frame, format, &out).map_err(failed)?;
             format!("{} particles", count(frame.positions.len() as u64))
         };
@@ -103,4 +114,13 @@ pub(in crate::cli) fn execute(arguments: &Arguments) -> Result<(), Failure> {
         writeln!(std::io::stdout(), "{} ({made}, {})", out.display(), bytes(size as f64))?;
     }
     Ok(())
+}
+
+/// The particles of a file as they are, or in space.
+fn revolved(frame: Frame, revolve: Option<Revolve>, file: &Path) -> Result<Frame, Failure> {
+    let refused = |reason: String| Failure::Usage(format!("{}: {reason}", file.display()));
+    match revolve {
+        Some(revolve) => frame.revolved(revolve).map_err(refused),
+        None => Ok(frame),
+    }
 }

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use super::message::warn_of;
 use crate::cli::Failure;
 use crate::io::picture::{self, Clip, Direction, Map, Scene, Settings};
+use crate::io::revolve::Revolve;
 use crate::io::snapshot::Header;
 use crate::job::AnyProblem;
 use crate::run::scene;
@@ -44,6 +45,10 @@ pub(in crate::cli) struct Looks {
     /// Mirror at the lower face of the domain across these axes, for models of a half or a quarter: x, y, xy.
     #[arg(long, value_name = "AXES", default_value = "", value_parser = axes)]
     mirror: Axes,
+    /// Draw bodies of revolution in space (jobs with geometry = "axisymmetric"), whole or with a quarter cut out.
+    #[arg(long, value_name = "open|whole", num_args = 0..=1, require_equals = true, default_missing_value = "open",
+        value_parser = str::parse::<Revolve>, conflicts_with_all = ["mirror", "tree"])]
+    revolve: Option<Revolve>,
     /// Draw the leaves of the tree: in 2D, at the clip, or at the floor.
     #[arg(long)]
     tree: bool,
@@ -123,6 +128,7 @@ impl Looks {
             focus: self.focus,
             clip: self.clip,
             mirror: self.mirror.0,
+            revolve: self.revolve,
             tree: self.tree,
             vectors: self.vectors.clone(),
             ..Settings::new(&title)

@@ -274,7 +274,7 @@ fn load_in_words<const D: usize>(load: &Load<D>) -> String {
         Quantity::Constant(value) => self::quantity(*value, unit),
         Quantity::Expression(_) => format!("an expression in {unit}"),
         Quantity::Table(_) => format!("a table in {unit}"),
-        Quantity::Field(_) => format!("values at places in {unit}"),
+        Quantity::Field(_) => format!("values from a file in {unit}"),
     };
     let axes = ["x", "y", "z"];
     let what = match &load.kind {

@@ -75,7 +75,7 @@ impl Surface {
     pub fn of(frame: &Frame, body: Option<&str>) -> Result<Self, String> {
         if frame.header.dimension != 3 {
             return Err(
-                "found an output of a 2D run; expected a 3D run, because surfaces exist in 3D only".into()
+                "found an output of a 2D run; expected a 3D run or bodies of revolution, because surfaces exist in space only".into()
             );
         }
         let is_chosen = chosen(frame, body)?;

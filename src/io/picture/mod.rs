@@ -18,6 +18,7 @@ use std::path::{Path, PathBuf};
 use partition::comm::Comm;
 
 use super::hdf5_file::{FileError, Reader};
+use super::revolve::{self, Revolve};
 use super::snapshot::content::fields::Values;
 use super::snapshot::{Header, PointField, View};
 use crate::particle::chunk::Layout;
@@ -273,7 +274,12 @@ fn drawing(
     let flat = header.dimension == 2;
     let leaves = if settings.tree { leaves(from, &header)? } else { Vec::new() };
     let vectors = Vectors::read(&file, &header, settings.vectors.as_deref())?;
-    Ok((Drawing { flat, domain, splats, tint, caption, solids, leaves, vectors }, header.time))
+    let drawing = Drawing { flat, domain, splats, tint, caption, solids, leaves, vectors };
+    let drawing = match settings.revolve {
+        Some(revolve) => drawing.revolved(&header, revolve).map_err(|reason| file.refuse(reason))?,
+        None => drawing,
+    };
+    Ok((drawing, header.time))
 }
 
 /// Collective on a shared drawing. The least value of all ranks.
@@ -505,6 +511,27 @@ impl Drawing {
         Some(format!(
             "the clip {clip} keeps no particle; expected a place among them, {name} from {low} to {high}"
         ))
+    }
+
+    /// The bodies of revolution in space of a plane drawing, without leaves.
+    ///
+    /// # Errors
+    /// In words: see [`revolve::copies`].
+    fn revolved(self, header: &Header, revolve: Revolve) -> Result<Self, String> {
+        let Self { splats, mut vectors, domain: Bounds { low, high }, .. } = self;
+        let sections = splats.iter().map(|splat| (splat.position[0], splat.radii[0] / LARGER));
+        let copies = revolve::copies(header, sections, revolve)?;
+        if !vectors.each.is_empty() {
+            vectors.each = copies.iter().map(|&(p, turn)| turn.vector(vectors.each[p])).collect();
+        }
+        let copied = copies.iter().map(|&(p, turn)| {
+            let Splat { position, radii: [radius, height, _], value } = splats[p];
+            Splat { position: turn.place(position), radii: [radius, radius, height], value }
+        });
+        let (splats, reach) = (copied.collect(), high[0]);
+        let domain = Bounds { low: [-reach, -reach, low[1]], high: [reach, reach, high[1]] };
+        let solids = self.solids.into_iter().map(|solid| solid.revolved(revolve)).collect();
+        Ok(Self { flat: false, domain, splats, vectors, solids, leaves: Vec::new(), ..self })
     }
 
     /// Adds the mirror images behind planes of symmetry. Returns the frame of all.

@@ -2,6 +2,7 @@
 use super::Direction;
 use super::camera::numbers;
 use super::colour::{DARK, LIGHT, Map, Paper};
+use crate::io::revolve::Revolve;
 
 /// Options of a picture.
 #[derive(Clone, Debug)]
@@ -30,6 +31,8 @@ pub struct Settings {
     pub clip: Option<Clip>,
     /// Axes whose lower face of the domain is a plane of symmetry, at which all is mirrored.
     pub mirror: [bool; 3],
+    /// Whether bodies of revolution are drawn in space, and how far they are turned.
+    pub revolve: Option<Revolve>,
     /// Whether leaves of the tree are drawn: in the plane, at the clip, or at the floor.
     pub tree: bool,
     /// Vectors that are drawn as arrows, by the name of their quantity.
@@ -116,6 +119,7 @@ impl Settings {
             dark: false,
             clip: None,
             mirror: [false; 3],
+            revolve: None,
             tree: false,
             vectors: None,
             longest: None,

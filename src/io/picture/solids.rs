@@ -3,6 +3,7 @@ use rayon::prelude::*;
 
 use super::camera::{Bounds, Camera, unit};
 use crate::geometry::vector::{cross, dot};
+use crate::io::revolve::Revolve;
 
 /// Signed distance of a place, m.
 pub type Distance = dyn Fn(&[f64; 3]) -> f64 + Send + Sync;
@@ -45,6 +46,18 @@ impl Solid {
             own(&folded)
         });
         Self { distance, triangles, bounds: [low, high] }
+    }
+}
+
+impl Solid {
+    /// The body of revolution of a section.
+    pub(super) fn revolved(self, revolve: Revolve) -> Self {
+        let Self { distance: own, bounds: [low, high], .. } = self;
+        let reach = high[0];
+        let distance =
+            Box::new(move |x: &[f64; 3]| own(&[x[0].hypot(x[1]), x[2], 0.0]).max(revolve.distance(x)));
+        let bounds = [[-reach, -reach, low[1]], [reach, reach, high[1]]];
+        Self { distance, triangles: Vec::new(), bounds }
     }
 }
 
