@@ -83,7 +83,7 @@ impl Frame {
     /// Its bodies of revolution in space: each particle next to itself about the axis, with the same id.
     ///
     /// # Errors
-    /// In words: see [`revolve::copies`].
+    /// In words: the file is of another geometry, or its copies are too many.
     pub fn revolved(mut self, revolve: Revolve) -> Result<Self, String> {
         let sections = self.positions.iter().map(|x| x[0]).zip(self.half_widths.iter().copied());
         let copies = revolve::copies(&self.header, sections, revolve)?;
