@@ -342,6 +342,11 @@ impl MaterialSetup {
     pub fn build(&self) -> Box<dyn Material> {
         undrained::build(&self.model, self.undrained.as_ref(), self.density)
     }
+
+    /// Whether it is a gas.
+    pub fn is_gas(&self) -> bool {
+        matches!(self.model, Parameters::Gas(_))
+    }
 }
 
 /// A body of particles.

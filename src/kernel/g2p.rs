@@ -343,14 +343,13 @@ impl Advance<'_> {
             (0..D).for_each(|i| gradient[i][i] += added);
         }
         let mut trial = strained(&elastic, &gradient, step);
-        let mut rate_of_volume = (1..D).fold(gradient[0][0], |sum, i| sum + gradient[i][i]);
+        let mut hoop = zero;
         if is_ring {
-            let mut rate = plain[2];
+            hoop = plain[2];
             if !dilation.is_empty() {
-                rate += batch.values(dilation);
+                hoop += batch.values(dilation);
             }
-            rate_of_volume += rate;
-            let stretch = rate.mul_add(step, V::splat(1.0));
+            let stretch = hoop.mul_add(step, V::splat(1.0));
             trial[2] = stretch * stretch * elastic[2];
         }
         if let Some(filled) = &filled {
@@ -369,7 +368,10 @@ impl Advance<'_> {
             }
         }
         let size = if scheme.softens { scheme.sizes(tags, batch) } else { [0.0; LANES] };
-        let shock = scheme.viscosity.map(|viscosity| Shock { viscosity, rate: rate_of_volume.to_array() });
+        let shock = scheme.viscosity.map(|viscosity| {
+            let plane = (1..D).fold(gradient[0][0], |sum, i| sum + gradient[i][i]);
+            Shock { viscosity, rate: (plane + hoop).to_array() }
+        });
         let update = Step { dt, plane: D == 2, cell, size, shock };
         match scheme.materials {
             [only] => only.update(&mut state, &update),

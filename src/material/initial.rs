@@ -19,6 +19,12 @@ pub enum Consolidation {
     Pressure(f64),
 }
 
+/// The pressure of a stress that is the same along all directions, Pa; `None` for any other stress.
+pub(super) fn even_pressure(stress: [f64; 3]) -> Option<f64> {
+    let pressure = -stress[0];
+    stress.iter().all(|s| (s + pressure).abs() <= 1e-12 * pressure.abs()).then_some(pressure)
+}
+
 /// State of a particle under stress.
 #[derive(Clone, Copy, Debug)]
 pub struct Stressed {

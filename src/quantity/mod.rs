@@ -21,7 +21,7 @@ pub use table::{Table, TableError};
 use std::sync::Arc;
 
 /// Names of the coordinates.
-const AXES: [&str; 3] = ["x", "y", "z"];
+pub const AXES: [&str; 3] = ["x", "y", "z"];
 
 /// From 0 at 0 to 1 at 1 on half a period of a cosine, `(1 - cos(π s)) / 2`; constant outside.
 pub fn smooth_step(s: f64) -> f64 {

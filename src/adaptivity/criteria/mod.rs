@@ -92,7 +92,8 @@ criteria! {
     PlasticStrain(plastic_strain::Parameters),
     /// Where the material flows plastically: the mean rate of plastic strain over the leaf's particles.
     PlasticStrainRate(plastic_strain_rate::Parameters),
-    /// Where water seeps fast: the greatest gradient of the head about a particle. In jobs with seepage, from the first change of the tree on.
+    /// Where water seeps fast: the greatest gradient of the head about a particle. In jobs with seepage, from
+    /// the first change of the tree on.
     HeadGradient(head_gradient::Parameters),
     /// Where a particle's box is stretched.
     Stretch(stretch::Parameters),

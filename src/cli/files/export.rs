@@ -33,8 +33,8 @@ pub struct Arguments {
     /// The leaves of the tree as VTK's HyperTreeGrid (XML), with the hierarchy: for ParaView 5.10 and later.
     #[arg(long, group = "format")]
     htg: bool,
-    /// Bodies of revolution in space (jobs with geometry = "axisymmetric"), whole or with a quarter cut out. Surfaces
-    /// are always in space.
+    /// Bodies of revolution in space (jobs with geometry = "axisymmetric"), whole or with a quarter cut out.
+    /// Surfaces are always in space.
     #[arg(long, value_name = "open|whole", num_args = 0..=1, require_equals = true, default_missing_value = "whole",
         value_parser = str::parse::<Revolve>, conflicts_with = "htg")]
     revolve: Option<Revolve>,

@@ -45,7 +45,8 @@ pub(in crate::cli) struct Looks {
     /// Mirror at the lower face of the domain across these axes, for models of a half or a quarter: x, y, xy.
     #[arg(long, value_name = "AXES", default_value = "", value_parser = axes)]
     mirror: Axes,
-    /// Draw bodies of revolution in space (jobs with geometry = "axisymmetric"), whole or with a quarter cut out.
+    /// Draw bodies of revolution in space (jobs with geometry = "axisymmetric"), whole or with a quarter cut
+    /// out.
     #[arg(long, value_name = "open|whole", num_args = 0..=1, require_equals = true, default_missing_value = "open",
         value_parser = str::parse::<Revolve>, conflicts_with_all = ["mirror", "tree"])]
     revolve: Option<Revolve>,

@@ -35,7 +35,7 @@ use crate::load::{Gravity, Load};
 use crate::material::parameters::{OutOfRange, Parameters};
 use crate::material::undrained::Undrained;
 use crate::particle::followed::Motion;
-use crate::quantity::Quantity;
+use crate::quantity::{AXES, Quantity};
 use crate::text::{excerpt, number, written};
 use partition::{Brick, key::MAX_ROOTS};
 use rustc_hash::FxHashMap;
@@ -269,8 +269,6 @@ pub(super) fn gravity<const D: usize>(
     }
     Some(Gravity { acceleration: components, start: 0.0 })
 }
-
-const AXES: [&str; 3] = ["x", "y", "z"];
 
 fn domain<const D: usize>(
     checks: &mut Checks,

@@ -1,10 +1,9 @@
 //! Quantities of the job file: numbers, expressions, tables over time, and values at places from files.
 use std::sync::Arc;
 
-use super::AXES;
 use super::checks::Checks;
 use super::shapes::RASTERS;
-use crate::geometry::mesh::{HeightRaster, Placing};
+use crate::geometry::mesh::HeightRaster;
 use crate::geometry::written::Vector;
 use crate::job::parse::error::QUOTED;
 use crate::job::parse::source::Path;
@@ -12,7 +11,7 @@ use crate::job::schema::loads::{
     Column as WrittenColumn, Points, Quantity as WrittenQuantity, Raster, Record,
 };
 use crate::quantity::record::{self, Column};
-use crate::quantity::{Expression, Field, Quantity, Table, field};
+use crate::quantity::{AXES, Expression, Field, Quantity, Table, field};
 use crate::text::{excerpt, number};
 
 /// As many quantities as the job has dimensions, or faults.
@@ -131,7 +130,7 @@ fn of_points<const D: usize>(checks: &mut Checks, written: &Points, path: &Path)
 fn of_raster<const D: usize>(checks: &mut Checks, written: &Raster, path: &Path) -> Option<Quantity> {
     let here = path.key("raster");
     let file = excerpt(&written.raster, QUOTED);
-    let placing = Placing { cell: written.cell, array: written.array.clone() };
+    let placing = checks.placing(&written.raster, written.cell, written.array.as_deref(), path)?;
     let raster = checks.read(&written.raster, RASTERS, &here, |from| HeightRaster::read(from, &placing))?;
     if let Some(gaps) = raster.gaps("value") {
         checks.fault(&here, format!("found \"{file}\", but {gaps}"));

@@ -1,5 +1,4 @@
 //! Water in the pores.
-use super::AXES;
 use super::checks::{Checks, Space};
 use super::quantities::at_nodes;
 use super::stress::needs_vertical_gravity;
@@ -13,6 +12,7 @@ use crate::load::seepage::{HeldHead, HeldRegion};
 use crate::load::water::Given;
 use crate::load::{Gravity, Kind, Load, Seepage, Up, Water};
 use crate::material;
+use crate::quantity::AXES;
 use crate::text::{excerpt, written as number};
 
 /// Name of the water among the loads.

@@ -2,12 +2,11 @@
 use super::NAME;
 use crate::job::Problem;
 use crate::job::problem::BoxPolicy;
-use crate::material::parameters::Parameters;
 use crate::text::excerpt;
 
 /// Warns of gas without artificial viscosity, and of boxes that do not tile it.
 pub(super) fn look<const D: usize>(problem: &Problem<D>, all: &mut Vec<String>) {
-    let is_gas = |index: &usize| matches!(problem.materials[*index].model, Parameters::Gas(_));
+    let is_gas = |index: &usize| problem.materials[*index].is_gas();
     let Some(index) = problem.bodies.iter().map(|body| body.material).find(is_gas) else { return };
     let name = excerpt(&problem.materials[index].name, NAME);
     if problem.viscosity.is_none() {

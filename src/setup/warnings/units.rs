@@ -7,7 +7,6 @@ use crate::job::Problem;
 use crate::job::problem::{Body, MaterialSetup};
 use crate::load::{Kind, Load};
 use crate::material::Material;
-use crate::material::parameters::Parameters;
 use crate::setup::seed::{greatest_speed, raster};
 use crate::text::{counted, excerpt, number, quantity};
 
@@ -85,10 +84,10 @@ fn of_material(index: usize, setup: &MaterialSetup, material: &dyn Material, all
         ));
     }
     let [gas, most] = DENSITIES;
-    let (least, lightest) = match &setup.model {
-        Parameters::Gas(_) => (THIN, "a thin gas"),
-        _ if material.is_fluid() => (gas, "a gas"),
-        _ => (FOAM, "the lightest foams"),
+    let (least, lightest) = match material.is_fluid() {
+        _ if setup.is_gas() => (THIN, "a thin gas"),
+        true => (gas, "a gas"),
+        false => (FOAM, "the lightest foams"),
     };
     if !(least..=most).contains(&setup.density) {
         all.push(format!(
@@ -117,8 +116,7 @@ fn of_body<const D: usize>(
     let (name, key) = (excerpt(&body.name, NAME), problem.key_of_body(index));
     let speed = greatest_speed(problem, body);
     // Gas may well be faster than its sound.
-    let is_gas = matches!(problem.materials[body.material].model, Parameters::Gas(_));
-    if speed > BODY * wave && !is_gas {
+    if speed > BODY * wave && !problem.materials[body.material].is_gas() {
         all.push(format!(
             "{key}.velocity: \"{name}\" moves at {}, {} times the speed of waves in its material; expected at most {BODY} times: check the units of speed, stiffness and density",
             quantity(speed, "m/s"),

@@ -24,15 +24,7 @@ impl Checks<'_> {
         };
         let origin = self.origin_of_file(origin.as_ref(), space, path)?;
         let here = path.key("file");
-        let placing = Placing { cell: *cell, array: array.clone() };
-        if array.is_some() && !file.to_lowercase().ends_with(".npz") {
-            let message = format!(
-                "found an array name for the file \"{}\"; expected one for a .npz file only",
-                excerpt(file, QUOTED)
-            );
-            self.fault(&path.key("array"), message);
-            return None;
-        }
+        let placing = self.placing(file, *cell, array.as_deref(), path)?;
         let raster = self.read(file, RASTERS, &here, |from| HeightRaster::read(from, &placing))?;
         let ground = self.made_of(Terrain::new(raster), file, &here)?;
         let [least, _] = ground.range();
@@ -70,6 +62,25 @@ impl Checks<'_> {
             None => Some(below),
             Some(top) => Some(Shape::Difference(Box::new(solid(&top)?), vec![below])),
         }
+    }
+
+    /// The keys at `path` that complement the file of a raster; a fault if the file has no arrays with names.
+    pub(in crate::job::convert) fn placing(
+        &mut self,
+        file: &str,
+        cell: Option<f64>,
+        array: Option<&str>,
+        path: &Path,
+    ) -> Option<Placing> {
+        if array.is_some() && !file.to_lowercase().ends_with(".npz") {
+            let message = format!(
+                "found an array name for the file \"{}\"; expected one for a .npz file only",
+                excerpt(file, QUOTED)
+            );
+            self.fault(&path.key("array"), message);
+            return None;
+        }
+        Some(Placing { cell, array: array.map(str::to_owned) })
     }
 
     fn made_of<T>(&mut self, made: Result<T, String>, file: &str, path: &Path) -> Option<T> {

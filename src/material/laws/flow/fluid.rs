@@ -7,7 +7,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::material::initial::Consolidation;
+use crate::material::initial::{Consolidation, even_pressure};
 use crate::material::laws::Model;
 use crate::material::tensor::strain::Strain;
 use crate::material::{HISTORIES, Law, PLASTIC_STRAIN, State, Step, eigen};
@@ -141,10 +141,7 @@ impl Law for Fluid {
         _history: &mut [f64; HISTORIES],
     ) -> Option<[f64; 3]> {
         // p = K/γ (J^-γ - 1), the same along all directions.
-        let [pressure, ..] = stress.map(|s| -s);
-        if stress.iter().any(|s| (s + pressure).abs() > 1e-12 * pressure.abs()) {
-            return None;
-        }
+        let pressure = even_pressure(stress)?;
         let Parameters { bulk_modulus, gamma, .. } = self.parameters;
         Some([-libm::log1p(gamma * pressure / bulk_modulus) / (3.0 * gamma); 3])
     }

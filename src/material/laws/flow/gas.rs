@@ -12,7 +12,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::material::initial::Consolidation;
+use crate::material::initial::{Consolidation, even_pressure};
 use crate::material::laws::Model;
 use crate::material::parameters::OutOfRange;
 use crate::material::tensor::eigen;
@@ -172,11 +172,7 @@ impl Law for Gas {
         _consolidation: Option<Consolidation>,
         history: &mut [f64; HISTORIES],
     ) -> Option<[f64; 3]> {
-        let [pressure, ..] = stress.map(|s| -s);
-        let is_even = stress.iter().all(|s| (s + pressure).abs() <= 1e-12 * pressure.abs());
-        if !is_even || pressure + self.stiffening <= 0.0 {
-            return None;
-        }
+        let pressure = even_pressure(stress).filter(|p| p + self.stiffening > 0.0)?;
         history[ENTROPY] = libm::log((pressure + self.stiffening) / self.adiabat());
         Some([0.0; 3])
     }
