@@ -12,6 +12,7 @@ pub mod input_file;
 pub mod io;
 pub mod job;
 pub mod kernel;
+pub mod leapfrog;
 pub mod load;
 pub mod material;
 pub mod memory;

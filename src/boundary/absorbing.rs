@@ -21,7 +21,7 @@ pub struct Absorbing {
 }
 
 impl Absorbing {
-    /// Changes the velocity (m/s) of a node on the face with normal `inward` along `axis` in a step of length
+    /// Changes the velocity (m/s) of a node on the face with normal `inward` along `axis` in a kick of length
     /// `dt` (s), at whose start it was `start`. `pressure` is the pressure at the node, Pa; `cell` is the
     /// edge of its cells, m.
     ///

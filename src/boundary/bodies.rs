@@ -11,6 +11,7 @@
 use std::fmt;
 
 use super::motion::length;
+use crate::leapfrog::Lengths;
 use crate::text::{number, quantity};
 
 /// Velocity field of each body, and the law of contact of each pair of fields.
@@ -131,23 +132,24 @@ impl fmt::Display for PairLaw {
 impl PairLaw {
     /// Impulse on the second of two bodies with these masses (kg) that meet at a node, kg m/s; the first
     /// takes the opposite. `relative` is the velocity of the first less that of the second, m/s, in a step of
-    /// length `dt`, s.
+    /// these lengths.
     ///
-    /// A gap may close within the step, so bodies approach freely at up to `gap / dt`. The impulse of
-    /// friction is bounded by Coulomb's law for the impulse of the step, `|J_t| ≤ μ J_n + c A Δt`.
+    /// A gap may close within the step, so bodies approach freely at up to the gap over its drift. The
+    /// impulse of friction is bounded by Coulomb's law for that of the step, `|J_t| ≤ μ J_n + c A Δt`, with
+    /// its kick Δt.
     pub fn impulse<const D: usize>(
         &self,
         relative: &[f64; D],
         masses: [f64; 2],
         meeting: &Meeting<D>,
         cell: f64,
-        dt: f64,
+        Lengths { kick, drift }: Lengths,
     ) -> [f64; D] {
         let mass = masses[0] * masses[1] / (masses[0] + masses[1]);
         let Meeting { normal, gap, area } = meeting;
         let closing = (0..D).fold(0.0, |sum, a| relative[a].mul_add(normal[a], sum));
         let along: [f64; D] = std::array::from_fn(|a| (-closing).mul_add(normal[a], relative[a]));
-        let excess = closing - gap.max(0.0) / dt;
+        let excess = closing - gap.max(0.0) / drift;
         let touching = excess > 0.0 || *gap <= TOUCH * cell;
         let (pressed, dragged) = match *self {
             Self::Sticky => return relative.map(|v| mass * v),
@@ -155,10 +157,10 @@ impl PairLaw {
             Self::Separating { friction, cohesion, tension } => {
                 let pressed = match excess > 0.0 {
                     true => mass * excess,
-                    false if touching => (mass * closing).max(-tension * area * dt).min(0.0),
+                    false if touching => (mass * closing).max(-tension * area * kick).min(0.0),
                     false => 0.0,
                 };
-                let sticking = if touching { cohesion * area * dt } else { 0.0 };
+                let sticking = if touching { cohesion * area * kick } else { 0.0 };
                 (pressed, friction.mul_add(pressed.max(0.0), sticking))
             }
         };
@@ -173,6 +175,8 @@ mod tests {
     use super::*;
 
     const FRICTION: PairLaw = PairLaw::Separating { friction: 0.5, cohesion: 0.0, tension: 0.0 };
+
+    const STEP: Lengths = Lengths { kick: 0.01, drift: 0.01 };
 
     fn meeting(gap: f64) -> Meeting<2> {
         Meeting { normal: [0.0, 1.0], gap, area: 1.0 }
@@ -202,30 +206,30 @@ mod tests {
     #[test]
     fn gaps_close_freely_and_no_further() {
         let masses = [1.0, 1.0];
-        assert_eq!(FRICTION.impulse(&[0.0, 1.0], masses, &meeting(0.02), 1.0, 0.01), [0.0; 2]);
-        let impulse = FRICTION.impulse(&[0.0, 3.0], masses, &meeting(0.02), 1.0, 0.01);
+        assert_eq!(FRICTION.impulse(&[0.0, 1.0], masses, &meeting(0.02), 1.0, STEP), [0.0; 2]);
+        let impulse = FRICTION.impulse(&[0.0, 3.0], masses, &meeting(0.02), 1.0, STEP);
         approx::assert_relative_eq!(impulse[1], 0.5, epsilon = 1e-14);
-        assert_eq!(FRICTION.impulse(&[0.0, -3.0], masses, &meeting(0.0), 1.0, 0.01), [0.0; 2]);
+        assert_eq!(FRICTION.impulse(&[0.0, -3.0], masses, &meeting(0.0), 1.0, STEP), [0.0; 2]);
     }
 
     #[test]
     fn friction_is_bounded_by_pressure_and_cohesion() {
         let masses = [2.0, 2.0];
-        let slides = FRICTION.impulse(&[3.0, 1.0], masses, &meeting(0.0), 1.0, 0.01);
+        let slides = FRICTION.impulse(&[3.0, 1.0], masses, &meeting(0.0), 1.0, STEP);
         assert_eq!(slides, [0.5, 1.0]);
-        let sticks = FRICTION.impulse(&[0.25, 1.0], masses, &meeting(0.0), 1.0, 0.01);
+        let sticks = FRICTION.impulse(&[0.25, 1.0], masses, &meeting(0.0), 1.0, STEP);
         assert_eq!(sticks, [0.25, 1.0]);
         let glue = PairLaw::Separating { friction: 0.0, cohesion: 20.0, tension: 10.0 };
-        let held = glue.impulse(&[3.0, -3.0], masses, &meeting(0.0), 1.0, 0.01);
+        let held = glue.impulse(&[3.0, -3.0], masses, &meeting(0.0), 1.0, STEP);
         approx::assert_relative_eq!(held[0], 0.2, epsilon = 1e-14);
         approx::assert_relative_eq!(held[1], -0.1, epsilon = 1e-14);
-        assert_eq!(glue.impulse(&[3.0, -3.0], masses, &meeting(0.1), 1.0, 0.01), [0.0; 2]);
+        assert_eq!(glue.impulse(&[3.0, -3.0], masses, &meeting(0.1), 1.0, STEP), [0.0; 2]);
     }
 
     #[test]
     fn slip_holds_together_and_sticky_stops_all() {
         let masses = [1.0, 3.0];
-        assert_eq!(PairLaw::Slip.impulse(&[3.0, -4.0], masses, &meeting(0.0), 1.0, 0.01), [0.0, -3.0]);
-        assert_eq!(PairLaw::Sticky.impulse(&[4.0, -4.0], masses, &meeting(0.0), 1.0, 0.01), [3.0, -3.0]);
+        assert_eq!(PairLaw::Slip.impulse(&[3.0, -4.0], masses, &meeting(0.0), 1.0, STEP), [0.0, -3.0]);
+        assert_eq!(PairLaw::Sticky.impulse(&[4.0, -4.0], masses, &meeting(0.0), 1.0, STEP), [3.0, -3.0]);
     }
 }

@@ -14,6 +14,7 @@ use super::Contact;
 use super::collider::Collider;
 use super::gap::{Bounds, STICKS};
 use super::motion::{Pose, Rate, length};
+use crate::leapfrog::Lengths;
 
 /// Gap, as a share of the distance at which a particle touches, up to which `sticky` and `slip` surfaces keep
 /// it.
@@ -53,7 +54,7 @@ pub fn touching_distance<const D: usize>(half: &[f64; D], normal: &[f64; D]) -> 
 
 impl<const D: usize> Touching<D> {
     /// A particle with its centre at `x` (m), of these half widths (m) and this density (kg/m³, for drag), in a
-    /// step of length `dt` (s). `None` if the gap to the surface is wider than `reach`, m, a function of the
+    /// step of these lengths. `None` if the gap to the surface is wider than `reach`, m, a function of the
     /// normal, the velocity of the surface and the distance at which the particle touches.
     pub fn new(
         number: usize,
@@ -61,7 +62,7 @@ impl<const D: usize> Touching<D> {
         (pose, rate): (&Pose<D>, &Rate<D>),
         x: &[f64; D],
         (half, density): (&[f64; D], f64),
-        dt: f64,
+        Lengths { kick, drift }: Lengths,
         reach: impl Fn(&[f64; D], &[f64; D], f64) -> f64,
     ) -> Option<Self> {
         let distance = collider.distance(x, pose);
@@ -76,14 +77,14 @@ impl<const D: usize> Touching<D> {
         }
         // A particle that is closer already, or inside, does not come closer. Pushing it out would add
         // energy.
-        let least = -gap.max(0.0) / dt;
+        let least = -gap.max(0.0) / drift;
         let held = gap <= HELD * touching && !matches!(collider.contact, Contact::Separating { .. });
         let bounds =
             Bounds { least, most: if held { least } else { f64::INFINITY }, sticking: 0.0, drag: 0.0 };
         let (law, impulse) = (collider.contact, [0.0; D]);
         // The part of the surface under a box that is this high over it.
         let area = (0..D).fold(1.0, |volume, a| volume * 2.0 * half[a]) / (2.0 * touching);
-        let over = if gap <= STICKS * touching { area * dt } else { 0.0 };
+        let over = if gap <= STICKS * touching { area * kick } else { 0.0 };
         let (sticking, drag) = (law.cohesion() * over, law.drag() * density * over);
         Some(Self {
             collider: number,

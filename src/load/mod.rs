@@ -20,6 +20,7 @@ pub use seepage::Seepage;
 pub use water::Water;
 
 use crate::geometry::Shape;
+use crate::leapfrog::Lengths;
 use crate::quantity::{Place, Quantity, in_job};
 
 /// Acceleration of gravity, which may change in time.
@@ -85,7 +86,7 @@ pub struct Load<const D: usize> {
     pub origin: [f64; D],
 }
 
-/// Effect of a load on the velocity v of a node in a step of length Δt.
+/// Effect of a load on the velocity v of a node in a step whose forces act over Δt.
 #[derive(Clone, Debug)]
 pub enum Kind<const D: usize> {
     /// Force per mass a (m/s²): `v += Δt a`.
@@ -190,19 +191,21 @@ impl<const D: usize> Load<D> {
         }
     }
 
-    /// Changes the velocity (m/s) of a node at `x` in a step of length `dt` (s) with its middle at the time
-    /// `middle` (s). Forces are taken at the middle; a prescribed velocity is its value there, so that the
-    /// displacement of the material is that of the prescribed motion to second order.
-    pub fn apply(&self, velocity: &mut [f64; D], x: &[f64; D], middle: f64, dt: f64) {
-        let (place, middle) = (in_job(&self.origin, x), middle - self.start);
+    /// Changes the velocity (m/s) of a node at `x` in a step from the time `start` (s). Forces are taken in
+    /// the middle of the time over which they act; a prescribed velocity is its value in the middle of the
+    /// step, so that the displacement of the material is that of the prescribed motion to second order.
+    pub fn apply(&self, velocity: &mut [f64; D], x: &[f64; D], start: f64, lengths: Lengths) {
+        let (place, start, kick) = (in_job(&self.origin, x), start - self.start, lengths.kick);
+        let of_forces = lengths.middle_of_kick(start);
         match &self.kind {
             Kind::Carried(_) | Kind::LocalDamping(_) | Kind::Water(_) => {}
             Kind::BodyForce(acceleration) => {
                 for axis in 0..D {
-                    velocity[axis] = dt.mul_add(acceleration[axis].at(place, middle), velocity[axis]);
+                    velocity[axis] = kick.mul_add(acceleration[axis].at(place, of_forces), velocity[axis]);
                 }
             }
             Kind::Velocity(prescribed) => {
+                let middle = lengths.middle_of_drift(start);
                 for axis in 0..D {
                     if let Some(value) = &prescribed[axis] {
                         velocity[axis] = value.at(place, middle);
@@ -210,7 +213,7 @@ impl<const D: usize> Load<D> {
                 }
             }
             Kind::Damping(rate) => {
-                let kept = libm::exp(-rate.at(place, middle) * dt);
+                let kept = libm::exp(-rate.at(place, of_forces) * kick);
                 velocity.iter_mut().for_each(|v| *v *= kept);
             }
         }
@@ -221,6 +224,8 @@ impl<const D: usize> Load<D> {
 mod tests {
     use super::*;
     use crate::quantity::{Expression, Table};
+
+    const STEP: Lengths = Lengths { kick: 0.1, drift: 0.1 };
 
     fn load(kind: Kind<2>) -> Load<2> {
         Load {
@@ -235,11 +240,11 @@ mod tests {
     }
 
     #[test]
-    fn body_forces_are_taken_in_the_middle_of_the_step_at_the_place_in_the_job() {
+    fn body_forces_are_taken_in_the_middle_of_the_kick_at_the_place_in_the_job() {
         let x = Quantity::Expression(Box::new(Expression::parse("x * t").unwrap()));
         let force = load(Kind::BodyForce([x, Quantity::Constant(-9.81)]));
         let mut velocity = [1.0, 0.0];
-        force.apply(&mut velocity, &[0.5, 3.0], 1.5, 0.1);
+        force.apply(&mut velocity, &[0.5, 3.0], 1.5, STEP);
         assert_eq!(velocity, [1.0 + 0.1 * (10.5 * 1.5), 0.1 * -9.81]);
         assert!(!force.is_active(0.99) && force.is_active(1.0) && !force.is_active(2.0));
     }
@@ -249,8 +254,9 @@ mod tests {
         let table = Table::new(&[(0.0, 0.0), (2.0, 4.0)]).unwrap();
         let grip = load(Kind::Velocity([None, Some(Quantity::Table(table))]));
         let mut velocity = [7.0, 8.0];
-        grip.apply(&mut velocity, &[0.0, 0.0], 1.5, 0.1);
-        assert_eq!(velocity, [7.0, 3.0]);
+        grip.apply(&mut velocity, &[0.0, 0.0], 1.5, STEP);
+        // In the middle of the step.
+        assert_eq!(velocity, [7.0, 2.0 * 1.55]);
     }
 
     /// In stages, times of a load are those since the first stage in which it acts.
@@ -262,7 +268,7 @@ mod tests {
         ]));
         ramp.start = 100.0;
         let mut velocity = [0.0; 2];
-        ramp.apply(&mut velocity, &[0.0; 2], 101.5, 0.5);
+        ramp.apply(&mut velocity, &[0.0; 2], 101.5, Lengths { kick: 0.5, drift: 0.5 });
         assert_eq!(velocity, [2.0, 0.0]);
         assert!(!ramp.is_active(1.5) && ramp.is_active(101.5));
         ramp.start = f64::INFINITY;
@@ -287,9 +293,9 @@ mod tests {
     fn damping_does_not_depend_on_the_step() {
         let damping = load(Kind::Damping(Quantity::Constant(3.0)));
         let (mut whole, mut halves) = ([2.0, -1.0], [2.0, -1.0]);
-        damping.apply(&mut whole, &[0.0; 2], 1.5, 0.2);
-        damping.apply(&mut halves, &[0.0; 2], 1.45, 0.1);
-        damping.apply(&mut halves, &[0.0; 2], 1.55, 0.1);
+        damping.apply(&mut whole, &[0.0; 2], 1.5, Lengths { kick: 0.2, drift: 0.2 });
+        damping.apply(&mut halves, &[0.0; 2], 1.5, STEP);
+        damping.apply(&mut halves, &[0.0; 2], 1.6, STEP);
         for axis in 0..2 {
             assert!((whole[axis] - halves[axis]).abs() <= 4.0 * f64::EPSILON * whole[axis].abs());
         }

@@ -231,10 +231,11 @@ impl<'a, const D: usize> Recorder<'a, D> {
         }
         self.last_values = values;
         // The sums restart; if the row of this step was written before, they are zero already.
+        let time = solver.time_of_velocities();
         solver.forget_reactions();
-        solver.load_sums.forget(3, clock.time);
-        solver.body_sums.forget(3, clock.time);
-        solver.face_sums.forget(FACE_SUMS, clock.time);
+        solver.load_sums.forget(3, time);
+        solver.body_sums.forget(3, time);
+        solver.face_sums.forget(FACE_SUMS, time);
         written
     }
 

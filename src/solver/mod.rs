@@ -36,6 +36,7 @@ use self::migration::crossings::Crossings;
 use self::migration::migrate::Moved;
 use crate::adaptivity::resample::ledger::Ledger;
 use crate::grid::KnownTree;
+use crate::leapfrog::Lengths;
 use crate::particle::Chunk;
 use crate::solver::state::bookings::{Contacts, ExactSums};
 use crate::solver::state::cost::Costs;
@@ -46,7 +47,7 @@ use crate::solver::state::leaf_data::LeafData;
 use crate::solver::state::phases::{Phase, Phases, thread_time};
 use crate::solver::state::regrid_cache::RegridCache;
 use crate::solver::state::regrid_timers::RegridTimers;
-use crate::solver::state::relaxation::Relaxation;
+use crate::solver::state::relaxation::{RelaxPhase, Relaxation};
 
 impl<const D: usize> Solver<D> {
     /// Collective. A solver for particles that lie in their leaves (`chunks[i]` in leaf `i`). For a state
@@ -144,26 +145,28 @@ impl<const D: usize> Solver<D> {
         self.comm.begin_step(self.clock.step);
         self.leaf_data.begin_step(self.clock.step, self.chunks.len());
         self.weigh_particles();
-        let advanced = self.advance(to, dt);
-        let settled = self.relax(dt);
+        let lengths = Lengths::new(self.lag(), dt);
+        let advanced = self.advance(to, lengths);
+        (self.clock.step, self.clock.time, self.clock.dt) = (self.clock.step + 1, to, dt);
+        let settled = self.relax(lengths);
         self.weigh_nodes();
         self.leaf_data.times.end_step();
-        (self.clock.step, self.clock.time, self.clock.dt) = (self.clock.step + 1, to, dt);
         self.close_step(advanced, requests).map(|report| StepReport { settled, ..report })
     }
 
-    /// Collective over neighbours. The method: one step of length `dt` to the time `to`, s.
-    /// `docs/time-step.md` goes through it.
-    fn advance(&mut self, to: f64, dt: f64) -> Result<Moved, StepError> {
+    /// Collective over neighbours. The method: one step of these lengths to the time `to`, s. Forces act over
+    /// the kick; all that moves does so over the drift, Δt. `docs/time-step.md` goes through it.
+    fn advance(&mut self, to: f64, lengths: Lengths) -> Result<Moved, StepError> {
+        let dt = lengths.drift;
         let mut rates = self.collider_rates(dt);
         let pushes = self.meet_bodies(&mut rates, dt);
         let sorted = self.sort_into_bins();
-        self.particles_to_nodes(dt);
-        let (mut impulses, held) = self.update_node_velocities(dt, &rates);
+        self.particles_to_nodes(lengths);
+        let (mut impulses, held) = self.update_node_velocities(lengths, &rates);
         self.prolong_velocities();
         self.fill_nodes();
         let departed = self.nodes_to_particles(&rates, to, dt);
-        self.book_pushes(dt);
+        self.book_pushes(lengths);
         self.book_conveyed();
         self.book_met(&mut impulses);
         let moved = self.migrate_particles(departed);
@@ -174,6 +177,20 @@ impl<const D: usize> Solver<D> {
         sorted?;
         held?;
         Ok(moved?)
+    }
+
+    /// How long before the present time the velocities belong to, s: half of the last step; 0 at the start
+    /// and where velocities have been set since.
+    pub fn lag(&self) -> f64 {
+        match self.relaxation.phase {
+            RelaxPhase::Stopped => 0.0,
+            _ => 0.5 * self.clock.dt,
+        }
+    }
+
+    /// The time to which velocities belong, and up to which forces have acted, s.
+    pub fn time_of_velocities(&self) -> f64 {
+        self.clock.time - self.lag()
     }
 
     /// The own leaves and those around them.

@@ -6,7 +6,7 @@ use crate::particle::chunk::{Layout, Tag};
 use crate::particle::halvings;
 use crate::solver::physics::Physics;
 use crate::solver::state::Solver;
-use crate::solver::state::relaxation::Relaxation;
+use crate::solver::state::relaxation::{RelaxPhase, Relaxation};
 use crate::solver::step::relax::stop;
 
 /// Changes of the particles at the start of a stage. Lists go over the bodies of the job.
@@ -39,8 +39,12 @@ impl<const D: usize> Solver<D> {
         let mut added = [change.added.iter().map(|chunk| chunk.len() as u64).sum()];
         self.comm.sum_u64(&mut added);
         self.ledger.next_root = self.next_root() + added[0];
-        if self.clock.bound == f64::INFINITY {
-            // A step without material sets no bound for the growth of the next one.
+        // Velocities that are set belong to the present time; those of bodies that come with others that move
+        // count as theirs.
+        let are_set = change.at_rest || self.relaxation.phase == RelaxPhase::Stopped;
+        // A step without material sets no bound for the growth of the next one.
+        if are_set || self.clock.bound == f64::INFINITY {
+            self.skip_forces(self.lag());
             self.clock.dt = 0.0;
         }
         let before = std::mem::replace(&mut self.physics, physics);

@@ -74,7 +74,7 @@ fn weight_is_the_mean_reaction_and_momentum_balances() {
         0.5,
         support,
     );
-    let (weight, time) = (9.81 * history.last("mass"), history.last("time"));
+    let (weight, time) = (9.81 * history.last("mass"), history.time_of_velocities());
     let (start, _) = history.at("time", 0.1);
     let mean = history.integral("force_table_y", start) / (time - start);
     println!("mean force {mean:.4} N, weight {:.4} N", -weight);

@@ -45,7 +45,7 @@ fn nothing_is_felt_before_a_gap_closes() {
     )
     .replace("dimension = 2\n", "dimension = 2\ngravity = [0, -10]\n");
     let history = history(&slot);
-    for (t, v) in history.column("time").iter().zip(history.column("velocity_block_y")) {
+    for (t, v) in history.times_of_velocities().into_iter().zip(history.column("velocity_block_y")) {
         assert!((v + 10.0 * t).abs() < 1e-8, "{v} at {t}");
     }
 }

@@ -28,6 +28,7 @@ mod loads;
 mod materials;
 mod meshes;
 mod mutations;
+mod order_in_time;
 mod paraview;
 mod particles;
 mod pictures;

@@ -64,7 +64,7 @@ fn a_jet_has_what_its_source_brought() {
 }
 
 /// Under gravity: what a source conveys does not fall, and the impulse that holds it is booked. `dp = g m dt`
-/// in each step, with what the source brings.
+/// in each step, with what the source brings, over the middles of steps.
 #[test]
 fn momentum_closes_under_gravity() {
     let job = format!(
@@ -74,7 +74,7 @@ fn momentum_closes_under_gravity() {
     );
     let (history, _) = history(&job);
     let (mass, dt) = (history.column("mass"), history.column("dt"));
-    let weight: f64 = (1..mass.len()).map(|i| -10.0 * mass[i - 1] * dt[i]).sum();
+    let weight: f64 = (1..mass.len()).map(|i| -10.0 * mass[i - 1] * 0.5 * (dt[i - 1] + dt[i])).sum();
     assert!(weight < -10.0);
     let expected = history.last("fed_belt_y") + weight;
     assert!((history.last("momentum_y") - expected).abs() < 1e-10 * weight.abs());

@@ -60,7 +60,7 @@ fn history(text: &str, name: &str) -> History {
 fn impulses_are_those_of_the_definition_while_particles_split_and_merge() {
     for (name, tree, rest) in [("uniform", "", ""), ("refined", REFINED, ""), ("dynamic", "", DYNAMIC)] {
         let history = history(&with_speed(&block(tree, &format!("{LOADS}{rest}"))), "body");
-        let time = history.last("time");
+        let time = history.time_of_velocities();
         if name == "dynamic" {
             println!("splits {}, merges {}", history.last("splits"), history.last("merges"));
             assert!(history.last("splits") > 50.0 && history.last("merges") > 50.0);
@@ -146,9 +146,9 @@ fn keeps_areas(comm: &Comm) {
                 }
                 places
             };
-            let (before, middle) = (places(&solver), solver.clock.time);
+            let (before, start) = (places(&solver), solver.time_of_velocities());
             solver.step(f64::MAX, Requests::default()).unwrap_or_else(|error| panic!("{error}"));
-            let middle = 0.5 * (middle + solver.clock.time);
+            let middle = 0.5 * (start + solver.time_of_velocities());
             let after = places(&solver);
             for (id, (x, area)) in &before {
                 if let Some((y, _)) = after.get(id) {

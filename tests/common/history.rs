@@ -29,10 +29,22 @@ impl History {
         *self.column(name).last().expect("a row")
     }
 
-    /// Integral over time of a column of means since the row before, from the first row at or after `start`.
+    /// Integral over time of a column of mean forces since the row before, from the first row at or after
+    /// `start`. Forces have acted up to the time of the velocities, half a step before that of the row.
     pub(crate) fn integral(&self, name: &str, start: f64) -> f64 {
         let (time, values) = (self.column("time"), self.column(name));
-        (1..time.len()).filter(|&i| time[i - 1] >= start).map(|i| values[i] * (time[i] - time[i - 1])).sum()
+        let acted = self.times_of_velocities();
+        (1..time.len()).filter(|&i| time[i - 1] >= start).map(|i| values[i] * (acted[i] - acted[i - 1])).sum()
+    }
+
+    /// Times to which the velocities of each row belong, s: half a step ago.
+    pub(crate) fn times_of_velocities(&self) -> Vec<f64> {
+        self.column("time").iter().zip(self.column("dt")).map(|(time, dt)| time - 0.5 * dt).collect()
+    }
+
+    /// The same of the last row, s.
+    pub(crate) fn time_of_velocities(&self) -> f64 {
+        self.last("time") - 0.5 * self.last("dt")
     }
 
     /// Value of a column in the first row at or after `start`, with its time.

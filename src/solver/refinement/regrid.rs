@@ -8,6 +8,7 @@ use rayon::prelude::*;
 use crate::adaptivity::{Adaptivity, LeafMaxima, Value};
 use crate::geometry::Aabb;
 use crate::grid::leaf_geometry::{leaf_box, position_key};
+use crate::leapfrog::Lengths;
 use crate::particle::Chunk;
 use crate::solver::migration::migrate::{MigrateError, Moved};
 use crate::solver::state::phases::Phase;
@@ -148,7 +149,7 @@ impl<const D: usize> Solver<D> {
         let _ = self.sort_into_bins();
         self.nodes_from_particles(0.0);
         let rates = self.collider_rates(0.0);
-        let _ = self.update_node_velocities(0.0, &rates);
+        let _ = self.update_node_velocities(Lengths::NONE, &rates);
         self.phases = phases;
     }
 

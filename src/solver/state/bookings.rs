@@ -25,7 +25,7 @@ pub struct Reaction {
 pub struct ExactSums<const N: usize> {
     /// Sums of each thing.
     pub of: Vec<[ExactSum; N]>,
-    /// Time of the last row of the history, s.
+    /// Time up to which forces had acted at the last row of the history, s.
     pub since: f64,
 }
 
@@ -50,13 +50,14 @@ impl<const N: usize> ExactSums<N> {
         all
     }
 
-    /// Mean rate of a sum since the last row, per second; 0 at the time of that row.
+    /// Mean rate of a sum since the last row, per second, at a time up to which forces have acted (s); 0 at
+    /// that of the row.
     pub fn mean(&self, sum: f64, time: f64) -> f64 {
         let elapsed = time - self.since;
         if elapsed > 0.0 { sum / elapsed } else { 0.0 }
     }
 
-    /// Not collective. Starts the first sums of each thing anew at a time, s.
+    /// Not collective. Starts the first sums of each thing anew at a time up to which forces have acted, s.
     pub fn forget(&mut self, first: usize, time: f64) {
         self.of.iter_mut().for_each(|sums| sums[..first].fill_with(ExactSum::new));
         self.since = time;
@@ -145,7 +146,7 @@ pub struct ForceAndWork {
 }
 
 impl ExactSums<LOAD_SUMS> {
-    /// Collective. Mean force and work of each thing at a time, s.
+    /// Collective. Mean force and work of each thing at a time up to which forces have acted, s.
     pub(in crate::solver) fn force_and_work(&self, comm: &Comm, time: f64) -> Vec<ForceAndWork> {
         let mean = |impulse: f64| self.mean(impulse, time);
         let all = self.totals(comm).into_iter();

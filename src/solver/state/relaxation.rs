@@ -3,6 +3,10 @@ use crate::solver::physics::Equilibrium;
 use crate::text::quantity;
 
 /// Progress of kinetic damping towards equilibrium; the same on all ranks.
+///
+/// In a step from rest forces act over half its length, so a mode of frequency ω and amplitude a at rest is at
+/// `a (1 - ω² Δt² / 2)` after it. Steps of one length have places `a cos nθ`, so at no stop is a mode further
+/// from its equilibrium than at the one before, for all steps that are stable at all.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Relaxation {
     /// Kinetic energy of the nodes in the last step, J; 0 once the velocities were set to 0.
@@ -17,15 +21,6 @@ pub struct Relaxation {
     pub phase: RelaxPhase,
 }
 
-/// Share of its velocity that material keeps after a step from rest, as the length of this step is that share
-/// of others.
-///
-/// A mode of frequency ω and amplitude a at rest is at `a (1 - ω² Δt² / 2)` after a step of Δt/√2, as
-/// leapfrog would have it with its first velocity, `ω² Δt a / 2`, half a step later. That is 1/√2 of the
-/// velocity after the step. With it positions are `a cos nθ`, so at no stop is a mode further from its
-/// equilibrium than at the one before, for all steps that are stable at all.
-pub(in crate::solver) const FROM_REST: f64 = std::f64::consts::FRAC_1_SQRT_2;
-
 /// Kind of a step on the way to equilibrium.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum RelaxPhase {
@@ -39,21 +34,20 @@ pub enum RelaxPhase {
 }
 
 impl Relaxation {
-    /// After a step of length `dt` (s) in which nodes with this mass of material (kg) had a kinetic energy,
-    /// and after a step from rest `½ Δt² Σ f² / m` of the forces on them, J. The second differs from the
-    /// first with mass scaling alone, where the root mean square of the velocities is one of the moving
-    /// masses, and so too great. Returns a factor for all velocities: 0 where they are to be set to 0, and
-    /// [`FROM_REST`] after a step from rest.
-    pub(in crate::solver) fn note(&mut self, [kinetic, pulled]: [f64; 2], mass: f64, dt: f64) -> f64 {
+    /// After a step in which forces acted over `kick` (s), and nodes with this mass of material (kg) had a
+    /// kinetic energy, and after a step from rest `½ kick² Σ f² / m` of the forces on them, J. The second
+    /// differs from the first with mass scaling alone, where the root mean square of the velocities is one of
+    /// the moving masses, and so too great. Returns whether velocities are to be set to 0.
+    pub(in crate::solver) fn note(&mut self, [kinetic, pulled]: [f64; 2], mass: f64, kick: f64) -> bool {
         if mass == 0.0 {
             // Nothing is at rest, after however long a step.
             *self = Self { stops: self.stops, phase: RelaxPhase::FromRest, ..Self::default() };
-            return 1.0;
+            return false;
         }
         let root_mean_square = |energy: f64| (2.0 * energy / mass).sqrt();
         let was_at_rest = self.phase == RelaxPhase::Stopped;
         if was_at_rest {
-            self.acceleration = root_mean_square(pulled) / dt;
+            self.acceleration = root_mean_square(pulled) / kick;
         }
         // Material that does not move at all is at rest too.
         let is_peak = !was_at_rest && (kinetic < self.kinetic || kinetic == 0.0);
@@ -61,18 +55,13 @@ impl Relaxation {
             self.speed = root_mean_square(self.kinetic);
             self.stops += 1;
         }
-        let factor = match (is_peak, was_at_rest) {
-            (true, _) => 0.0,
-            (false, true) => FROM_REST,
-            (false, false) => 1.0,
-        };
-        self.kinetic = factor * factor * kinetic;
+        self.kinetic = if is_peak { 0.0 } else { kinetic };
         self.phase = match (is_peak, was_at_rest) {
             (true, _) => RelaxPhase::Stopped,
             (false, true) => RelaxPhase::FromRest,
             (false, false) => RelaxPhase::Falling,
         };
-        factor
+        is_peak
     }
 
     /// Whether this is the equilibrium asked for.
@@ -106,9 +95,11 @@ mod tests {
         let mut relaxation = Relaxation::default();
         let mut steps = 0;
         while !relaxation.is_settled(&asked) {
-            v -= dt * x;
+            let is_first = steps == 0 || relaxation.phase == RelaxPhase::Stopped;
+            let kick = if is_first { 0.5 * dt } else { dt };
+            v -= kick * x;
             x += dt * v;
-            v *= relaxation.note([0.5 * v * v; 2], 1.0, dt);
+            v = if relaxation.note([0.5 * v * v; 2], 1.0, kick) { 0.0 } else { v };
             steps += 1;
             assert!(steps < 3000, "{relaxation:?}, x = {x}");
         }
@@ -131,15 +122,14 @@ mod tests {
                 relaxation.phase = RelaxPhase::Stopped;
                 let mut greatest = x.map(f64::abs);
                 for _ in 0..400 {
-                    let dt = if relaxation.phase == RelaxPhase::Stopped { FROM_REST } else { 1.0 };
+                    let kick = if relaxation.phase == RelaxPhase::Stopped { 0.5 } else { 1.0 };
                     for i in 0..2 {
-                        v[i] -= dt * frequencies[i].powi(2) * x[i];
-                        x[i] += dt * v[i];
+                        v[i] -= kick * frequencies[i].powi(2) * x[i];
+                        x[i] += v[i];
                     }
                     let kinetic = 0.5 * (v[0] * v[0] + v[1] * v[1]);
-                    let factor = relaxation.note([kinetic; 2], 1.0, dt);
-                    v = v.map(|v| factor * v);
-                    if factor == 0.0 {
+                    if relaxation.note([kinetic; 2], 1.0, kick) {
+                        v = [0.0; 2];
                         for i in 0..2 {
                             let least = greatest[i] * (1.0 + 1e-12);
                             assert!(x[i].abs() <= least, "{full} {other}: {x:?} after {greatest:?}");
@@ -155,8 +145,8 @@ mod tests {
     #[test]
     fn what_is_at_rest_is_settled_after_two_steps() {
         let mut relaxation = Relaxation::default();
-        assert_eq!(relaxation.note([0.0; 2], 1.0, 0.1), 0.0);
-        assert!(relaxation.note([0.0; 2], 1.0, 0.1) > 0.0);
+        assert!(relaxation.note([0.0; 2], 1.0, 0.1));
+        assert!(!relaxation.note([0.0; 2], 1.0, 0.1));
         assert!(relaxation.is_settled(&Equilibrium {
             speed: 1e-9,
             acceleration: 1e-9,

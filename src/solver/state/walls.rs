@@ -8,6 +8,7 @@ use crate::grid::GridPlan;
 use crate::grid::mask::{arena_overlap, block_nodes, offset, offset_count};
 use crate::grid::plan::NO_BLOCK;
 use crate::grid::plan::needed_nodes::nodes_in_domain;
+use crate::leapfrog::Lengths;
 
 /// Where material may be held back on the nodes of one plan.
 pub(in crate::solver) struct Walls {
@@ -15,8 +16,8 @@ pub(in crate::solver) struct Walls {
     pub still: Option<StillWalls>,
     /// Whether particles of any rank may be in reach of a surface in the next step.
     pub is_near: bool,
-    /// The step over which gaps are known (s), if they are known in this one.
-    pub known_over: Option<f64>,
+    /// Lengths of the step over which gaps are known, if they are known in this one.
+    pub known_over: Option<Lengths>,
 }
 
 impl Default for Walls {

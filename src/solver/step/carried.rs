@@ -9,6 +9,7 @@
 use rayon::prelude::*;
 
 use crate::exact_sum::ExactSum;
+use crate::leapfrog::Lengths;
 use crate::load::{Carried, Kind, Load, cofactor};
 use crate::particle::chunk::{Chunk, Layout};
 use crate::particle::followed::head;
@@ -76,8 +77,10 @@ struct Pushing<'a, const D: usize> {
     on_particles: [f64; D],
     /// Whether forces act on all particles, and not only on those that carry something.
     all: bool,
+    /// Middle of the time over which forces act, s.
     middle: f64,
-    dt: f64,
+    /// Its length, s.
+    kick: f64,
 }
 
 impl<const D: usize> Pushing<'_, D> {
@@ -104,9 +107,9 @@ impl<const D: usize> Pushing<'_, D> {
                 let velocity: [f64; D] = chunk.read(Layout::<D>::VELOCITY, p);
                 before.push((p as u32, velocity));
                 let falling =
-                    std::array::from_fn(|a| (self.dt / scale).mul_add(self.on_particles[a], velocity[a]));
+                    std::array::from_fn(|a| (self.kick / scale).mul_add(self.on_particles[a], velocity[a]));
                 let pushed = pushes[from..].iter().fold(falling, |velocity: [f64; D], push| {
-                    std::array::from_fn(|a| self.dt.mul_add(push.force[a] / mass, velocity[a]))
+                    std::array::from_fn(|a| self.kick.mul_add(push.force[a] / mass, velocity[a]))
                 });
                 chunk.write(Layout::<D>::VELOCITY, p, &pushed);
             }
@@ -147,7 +150,7 @@ fn displacement<const D: usize>(chunk: &Chunk<D>, first: Option<usize>, p: usize
 impl<const D: usize> Solver<D> {
     /// Not collective. Gives particles the impulse of the forces on them, for P2G. Returns their velocities
     /// before, by leaf, for [`Solver::take_back_push`]; empty if no force acts.
-    pub(in crate::solver) fn push_particles(&mut self, dt: f64) -> Vec<Velocities<D>> {
+    pub(in crate::solver) fn push_particles(&mut self, lengths: Lengths) -> Vec<Velocities<D>> {
         let (physics, time) = (&self.physics, self.clock.time);
         let scaled = physics.has_scaled_masses();
         let loads = physics.loads.iter().enumerate();
@@ -155,7 +158,7 @@ impl<const D: usize> Solver<D> {
         if loads.is_empty() && !scaled {
             return Vec::new();
         }
-        let middle = time + 0.5 * dt;
+        let middle = lengths.middle_of_kick(time);
         let plan = &self.grid.plan;
         let pushing = Pushing {
             widths: physics.widths(plan),
@@ -166,7 +169,7 @@ impl<const D: usize> Solver<D> {
             gravity: physics.gravity.at(middle),
             on_particles: if scaled { physics.gravity.at(middle) } else { [0.0; D] },
             middle,
-            dt,
+            kick: lengths.kick,
         };
         self.pushes.resize_with(self.chunks.len(), Vec::new);
         let leaves = self.chunks.par_iter_mut().zip(&mut self.pushes).enumerate().with_min_len(32);
@@ -207,11 +210,11 @@ impl<const D: usize> Solver<D> {
 
     /// Not collective. Adds impulse and work of the forces on particles to the sums of the loads, after
     /// particles have moved.
-    pub(in crate::solver) fn book_pushes(&mut self, dt: f64) {
+    pub(in crate::solver) fn book_pushes(&mut self, Lengths { kick, .. }: Lengths) {
         for push in self.pushes.iter().flatten() {
             let sums = &mut self.load_sums.of[push.load as usize];
             for a in 0..D {
-                sums[a].add(dt * push.force[a]);
+                sums[a].add(kick * push.force[a]);
                 sums[3].add(push.force[a] * push.way[a]);
             }
         }

@@ -103,7 +103,8 @@ impl<const D: usize> Solver<D> {
     /// momentum given to it over the time since. Exact before it is rounded once.
     pub fn reactions(&self) -> Vec<Reaction> {
         let sums = &self.contacts.sums;
-        let mean = |impulse: f64| sums.mean(impulse, self.clock.time);
+        let time = self.time_of_velocities();
+        let mean = |impulse: f64| sums.mean(impulse, time);
         let all = sums.totals(&self.comm).into_iter();
         all.map(|[x, y, z, a, b, c]| Reaction { force: [x, y, z].map(mean), torque: [a, b, c].map(mean) })
             .collect()
@@ -111,7 +112,8 @@ impl<const D: usize> Solver<D> {
 
     /// Not collective. Resets the means of [`Solver::reactions`].
     pub fn forget_reactions(&mut self) {
-        self.contacts.sums.forget(SUMS, self.clock.time);
+        let time = self.time_of_velocities();
+        self.contacts.sums.forget(SUMS, time);
     }
 
     /// Not collective. Bound on a step without material, in which free colliders move alone, s: none moves

@@ -4,6 +4,7 @@ use rayon::prelude::*;
 use crate::grid::mask::block_nodes;
 use crate::grid::{GridPlan, NodeFields};
 use crate::kernel::Row;
+use crate::leapfrog::Lengths;
 use crate::load::Load;
 use crate::solver::state::Solver;
 use crate::solver::state::bookings::ForceAndWork;
@@ -24,8 +25,7 @@ fn apply<const D: usize>(
     start: &[Row],
     plan: &GridPlan<D>,
     loads: &[(usize, &Load<D>)],
-    middle: f64,
-    dt: f64,
+    (time, lengths): (f64, Lengths),
 ) -> Vec<Push<D>> {
     let nodes = block_nodes(D);
     let blocks = fields.rows.par_chunks_mut(nodes).zip(&plan.blocks).zip(&fields.active).enumerate();
@@ -42,7 +42,7 @@ fn apply<const D: usize>(
             let mut velocity: [f64; D] = std::array::from_fn(|a| row.0[a]);
             for &(number, load) in loads.iter().filter(|(_, load)| load.reaches(&x)) {
                 let before = velocity;
-                load.apply(&mut velocity, &x, middle, dt);
+                load.apply(&mut velocity, &x, time, lengths);
                 if load.needs_start()
                     && let Some(Row(start)) = start.get(index * nodes + bit)
                 {
@@ -63,7 +63,7 @@ fn apply<const D: usize>(
 impl<const D: usize> Solver<D> {
     /// Not collective. Applies loads to the velocities of real nodes. Returns their impulses, for
     /// [`Solver::book_loads`].
-    pub(in crate::solver) fn apply_loads(&mut self, dt: f64) -> Vec<Push<D>> {
+    pub(in crate::solver) fn apply_loads(&mut self, lengths: Lengths) -> Vec<Push<D>> {
         let time = self.clock.time;
         let scaled = self.physics.has_scaled_masses();
         let loads = self.physics.loads.iter().enumerate();
@@ -75,8 +75,8 @@ impl<const D: usize> Solver<D> {
         let grid = &mut self.grid;
         self.phases.time(Phase::Nodes, || {
             // The pass ahead of a regrid takes no time, and no force acts in it.
-            let start = if dt > 0.0 { &grid.increments.start[..] } else { &[] };
-            apply(&mut grid.fields, start, &grid.plan, &active, time + 0.5 * dt, dt)
+            let start = if lengths.kick > 0.0 { &grid.increments.start[..] } else { &[] };
+            apply(&mut grid.fields, start, &grid.plan, &active, (time, lengths))
         })
     }
 
@@ -96,6 +96,6 @@ impl<const D: usize> Solver<D> {
 
     /// Collective. Mean force and work of each load.
     pub fn load_totals(&self) -> Vec<ForceAndWork> {
-        self.load_sums.force_and_work(&self.comm, self.clock.time)
+        self.load_sums.force_and_work(&self.comm, self.time_of_velocities())
     }
 }

@@ -8,6 +8,7 @@ use crate::exact_sum::ExactSum;
 use crate::grid::mask::block_nodes;
 use crate::grid::{GridPlan, NodeFields};
 use crate::kernel::Row;
+use crate::leapfrog::Lengths;
 use crate::quantity::in_job;
 use crate::solver::physics::Physics;
 use crate::solver::sorting::bins::BinMissing;
@@ -18,40 +19,42 @@ use crate::solver::state::phases::Phase;
 use crate::solver::state::walls::Walls;
 
 impl<const D: usize> Solver<D> {
-    /// Collective over neighbours. `v_j = p_j / m_j + Δt g` on real nodes, then loads, ties of surface nodes,
+    /// Collective over neighbours. `v_j = p_j / m_j + Δt g` on real nodes with the kick Δt, then loads, ties of surface nodes,
     /// contact between bodies, the conditions of domain faces and those of colliders, with those of faces
     /// again in each sweep, so that nothing is driven out of the domain. Returns impulse and angular impulse
     /// on each collider from nodes and particles of this rank, and whether all particles in contact have
-    /// bins. With a `dt` of 0 it shows the velocities between two steps: bodies and particles are not held,
+    /// bins. With no length it shows the velocities between two steps: bodies and particles are not held,
     /// and nothing is booked.
     pub(in crate::solver) fn update_node_velocities(
         &mut self,
-        dt: f64,
+        lengths: Lengths,
         rates: &[Rate<D>],
     ) -> (Vec<[ExactSum; SUMS]>, Result<(), BinMissing>) {
         // With mass scaling the weight of particles is in their momentum.
         let gravity = match self.physics.has_scaled_masses() {
-            false => self.physics.gravity.at(self.clock.time + 0.5 * dt),
+            false => self.physics.gravity.at(lengths.middle_of_kick(self.clock.time)),
             true => [0.0; D],
         };
-        let is_step = dt > 0.0;
+        let is_step = lengths.drift > 0.0;
         let mut pushes = Vec::new();
         self.for_each_field(|solver, field| {
             let grid = &mut solver.grid;
-            solver.phases.time(Phase::Nodes, || update_velocity(&mut grid.fields, &grid.plan, gravity, dt));
-            pushes.push(solver.apply_loads(dt));
+            solver
+                .phases
+                .time(Phase::Nodes, || update_velocity(&mut grid.fields, &grid.plan, gravity, lengths.kick));
+            pushes.push(solver.apply_loads(lengths));
             solver.tie_surface(field);
         });
-        let meets = self.meeting_nodes(dt);
-        let mut held = self.find_surfaces(&meets, dt);
-        self.press_bodies(&meets, held.is_ok(), dt);
+        let meets = self.meeting_nodes(is_step);
+        let mut held = self.find_surfaces(&meets, lengths);
+        self.press_bodies(&meets, held.is_ok(), lengths);
         let mut impulses = self.no_impulses();
         self.for_each_field(|solver, field| {
             solver.hold_at_nodes(field, rates, &mut impulses);
-            solver.apply_faces(field, dt, is_step);
+            solver.apply_faces(field, lengths, is_step);
             solver.hold_at_feet(field, rates, &mut impulses);
             if is_step && solver.has_contact_at_particles() {
-                let of_field = solver.hold_particles(field, dt, rates, &mut impulses);
+                let of_field = solver.hold_particles(field, lengths, rates, &mut impulses);
                 held = held.and(of_field);
             }
             if is_step {
@@ -66,14 +69,14 @@ impl<const D: usize> Solver<D> {
 
     /// Not collective. Applies the conditions of the faces of the domain to the nodes on them, for the
     /// velocity field numbered `field`. In a step, it also sums the impulses on the faces from the nodes that
-    /// this rank counts, if these are needed. Faces that absorb waves take the impulse of a time of `dt`, s.
-    pub(super) fn apply_faces(&mut self, field: usize, dt: f64, is_step: bool) {
+    /// this rank counts, if these are needed. Faces that absorb waves take the impulse of the kick.
+    pub(super) fn apply_faces(&mut self, field: usize, lengths: Lengths, is_step: bool) {
         let Physics { faces, absorbing, origin, .. } = &self.physics;
-        let (grid, middle) = (&mut self.grid, self.clock.time + 0.5 * dt);
+        let (grid, middle) = (&mut self.grid, lengths.middle_of_kick(self.clock.time));
         let solids = std::mem::take(&mut grid.solids);
         let gaps = self.physics.gaps(&grid.walls, &solids, field);
         let (contacts, absorbing, start) = (faces, Some(absorbing), &grid.increments.start[..]);
-        let faces = Faces { contacts, gaps, absorbing, start, origin: *origin, middle, dt };
+        let faces = Faces { contacts, gaps, absorbing, start, origin: *origin, middle, kick: lengths.kick };
         let (plan, sums) = (&grid.plan, &mut self.face_sums.of);
         self.phases.time(Phase::Nodes, || {
             if sums.is_empty() || !is_step {
@@ -92,7 +95,8 @@ impl<const D: usize> Solver<D> {
     /// Collective. Mean force on each face of the domain since the last row of the history, N: lower and
     /// upper along each axis; empty if not needed.
     pub fn face_forces(&self) -> Vec<[f64; 3]> {
-        let mean = |impulse: f64| self.face_sums.mean(impulse, self.clock.time);
+        let time = self.time_of_velocities();
+        let mean = |impulse: f64| self.face_sums.mean(impulse, time);
         self.face_sums.totals(&self.comm).into_iter().map(|impulse| impulse.map(mean)).collect()
     }
 
@@ -149,10 +153,10 @@ pub struct Faces<'a, const D: usize> {
     pub start: &'a [Row],
     /// Lower corner of the domain in the job's coordinates, m.
     pub origin: [f64; D],
-    /// Middle of the step, s.
+    /// Middle of the time over which forces act, s.
     pub middle: f64,
     /// Its length, s.
-    pub dt: f64,
+    pub kick: f64,
 }
 
 /// Where the material at the nodes of surfaces is.
@@ -170,7 +174,8 @@ impl<const D: usize> Physics<D> {
     /// Where the material of a velocity field is, if it is known.
     pub(super) fn gaps<'a>(&self, walls: &Walls, solids: &'a [Solids<D>], field: usize) -> Option<Gaps<'a>> {
         let touches = !self.moves_over_gaps(field);
-        let over = walls.known_over.filter(|_| !touches || self.has_walls_by_area())?;
+        let over =
+            walls.known_over.map(|lengths| lengths.drift).filter(|_| !touches || self.has_walls_by_area())?;
         Some(Gaps { sums: &solids[field].field.fields.rows, over, touches })
     }
 
@@ -207,7 +212,7 @@ impl Gaps<'_> {
 impl<'a, const D: usize> Faces<'a, D> {
     /// Contacts alone, for velocities that no step has changed.
     pub fn without_absorption(contacts: &'a [[Contact; 2]; D], gaps: Option<Gaps<'a>>) -> Self {
-        Self { contacts, gaps, absorbing: None, start: &[], origin: [0.0; D], middle: 0.0, dt: 0.0 }
+        Self { contacts, gaps, absorbing: None, start: &[], origin: [0.0; D], middle: 0.0, kick: 0.0 }
     }
 }
 
@@ -241,16 +246,16 @@ pub fn apply_faces<const D: usize>(
                                 &std::array::from_fn(|a| start[a]),
                                 (axis, inward),
                                 pressure,
-                                faces.dt,
+                                faces.kick,
                                 cell,
                             );
                         }
                         None => {
                             let law = faces.contacts[axis][side];
                             let cohesion =
-                                if row[3] > 0.0 { law.cohesion() * faces.dt / row[3] } else { 0.0 };
+                                if row[3] > 0.0 { law.cohesion() * faces.kick / row[3] } else { 0.0 };
                             let gaps = faces.gaps.filter(|_| law.has_gap());
-                            let by_area = [cohesion, law.drag() * faces.dt];
+                            let by_area = [cohesion, law.drag() * faces.kick];
                             let bounds = gaps.map(|gaps| gaps.bounds(node as usize, &normal, cell, by_area));
                             law.apply_within(bounds.unwrap_or(Bounds::TOUCHING), &mut velocity, &normal);
                         }

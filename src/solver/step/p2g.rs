@@ -4,6 +4,7 @@ use rayon::prelude::*;
 use crate::grid::arenas::ArenaMut;
 use crate::kernel::p2g::{self, MomentSums};
 use crate::kernel::{Scheme, Transfer, spread};
+use crate::leapfrog::Lengths;
 use crate::particle::Chunk;
 use crate::particle::chunk::{Layout, Place, Tag};
 use crate::solver::sorting::bin_view::BinView;
@@ -42,13 +43,13 @@ impl<const D: usize> Solver<D> {
 
     /// Collective over neighbours. `m_j = Σ w m`, `p_j = Σ w (m (v + C (x_j - x)) + Δt f) - Δt Σ V₀ τ ∇w` on
     /// real nodes, summed over all ranks, with the forces f that act on particles; with FLIP and XPIC also
-    /// `p_j` without forces. With mass scaling m is the mass with which a particle moves.
-    pub(in crate::solver) fn particles_to_nodes(&mut self, dt: f64) {
+    /// `p_j` without forces. Δt is the kick. With mass scaling m is the mass with which a particle moves.
+    pub(in crate::solver) fn particles_to_nodes(&mut self, lengths: Lengths) {
         self.scatter_volumes();
         self.scale_masses(|mass, scale| mass * scale);
         self.for_each_field(|solver, _| solver.note_velocities());
-        let before = self.push_particles(dt);
-        self.nodes_from_particles(dt);
+        let before = self.push_particles(lengths);
+        self.nodes_from_particles(lengths.kick);
         self.take_back_push(&before);
         self.scale_masses(|mass, scale| mass / scale);
     }

@@ -3,13 +3,14 @@
 //! While material moves towards equilibrium its kinetic energy rises; after a peak all velocities are set to
 //! 0, and motion starts again from rest, closer to equilibrium (Cundall 1976). The step from rest shows the
 //! unbalanced force, with the reactions of loads, colliders and faces: nodes then have the velocity
-//! `Δt f / m`. After it all velocities are multiplied by 1/√2, so that stops excite no mode. The energy is an
-//! exact sum over nodes, so the peaks do not depend on ranks.
+//! `Δt f / 2 m`, since forces act over half the step. The energy is an exact sum over nodes, so the peaks do
+//! not depend on ranks.
 use rayon::prelude::*;
 
 use crate::exact_sum::ExactSum;
 use crate::grid::NodeFields;
 use crate::grid::mask::block_nodes;
+use crate::leapfrog::Lengths;
 use crate::particle::Chunk;
 use crate::particle::chunk::Layout;
 use crate::solver::state::Solver;
@@ -18,8 +19,8 @@ use crate::solver::state::phases::Phase;
 impl<const D: usize> Solver<D> {
     /// Not collective. Sums over the real nodes that this rank counts, for [`Solver::relax`], in jobs that
     /// relax to equilibrium: kinetic energy of the masses with which they move; masses of the material; and
-    /// `½ s m v²` with mass scaling by s, so that after a step from rest, `v = Δt f / m`, it is
-    /// `½ Δt² f² s / m`, the force over the mass of the material.
+    /// `½ s m v²` with mass scaling by s, so that after a step from rest, `v = Δt f / 2 m`, it is
+    /// `⅛ Δt² f² s / m`, the force over the mass of the material.
     pub(in crate::solver) fn note_motion(&mut self) {
         if self.physics.equilibrium.is_none() {
             return;
@@ -58,36 +59,35 @@ impl<const D: usize> Solver<D> {
         });
     }
 
+    /// Not collective. Velocities have been set, so that they belong to the present time and no longer to one
+    /// that is `lag` before, s: no force acts in between, and means over the history leave that out.
+    pub(in crate::solver) fn skip_forces(&mut self, lag: f64) {
+        self.contacts.sums.since += lag;
+        self.load_sums.since += lag;
+        self.face_sums.since += lag;
+        self.body_sums.since += lag;
+    }
+
     /// Collective. Sets velocities to 0 after a step in which the kinetic energy fell, in jobs that relax to
     /// equilibrium. True once that is reached.
-    pub(in crate::solver) fn relax(&mut self, dt: f64) -> bool {
+    pub(in crate::solver) fn relax(&mut self, lengths: Lengths) -> bool {
         let Some(asked) = self.physics.equilibrium else { return false };
         let (comm, motion) = (&self.comm, &mut self.motion);
         self.phases.time(Phase::Reduce, || ExactSum::sum_over_ranks(comm, motion));
         let [kinetic, mass, scaled] = self.motion.each_ref().map(ExactSum::to_f64);
         let pulled = if self.physics.has_scaled_masses() { scaled } else { kinetic };
-        let factor = self.relaxation.note([kinetic, pulled], mass, dt);
-        if factor == 0.0 {
+        let lag = self.lag();
+        if self.relaxation.note([kinetic, pulled], mass, lengths.kick) {
             self.chunks.iter_mut().for_each(stop);
-        } else if factor != 1.0 {
-            self.chunks.par_iter_mut().for_each(|chunk| scale(chunk, factor));
+            self.skip_forces(lag);
         }
         self.relaxation.is_settled(&asked)
     }
 }
 
-/// Columns of velocities and their gradients.
-fn motion<const D: usize>() -> impl Iterator<Item = usize> {
-    let velocity = Layout::<D>::VELOCITY..Layout::<D>::VELOCITY + D;
-    velocity.chain(Layout::<D>::AFFINE..Layout::<D>::AFFINE + D * D)
-}
-
 /// Sets all velocities and their gradients to 0.
 pub(in crate::solver) fn stop<const D: usize>(chunk: &mut Chunk<D>) {
-    motion::<D>().for_each(|column| chunk.column_mut(column).fill(0.0));
-}
-
-/// Multiplies all velocities and their gradients.
-fn scale<const D: usize>(chunk: &mut Chunk<D>, factor: f64) {
-    motion::<D>().for_each(|column| chunk.column_mut(column).into_iter().for_each(|v| *v *= factor));
+    let velocity = Layout::<D>::VELOCITY..Layout::<D>::VELOCITY + D;
+    let motion = velocity.chain(Layout::<D>::AFFINE..Layout::<D>::AFFINE + D * D);
+    motion.for_each(|column| chunk.column_mut(column).fill(0.0));
 }

@@ -6,20 +6,10 @@ use crate::particle::chunk::{Chunk, Layout, TILE, Tag};
 use crate::simd::{Lanes, Vector};
 use crate::solver::physics::Physics;
 use crate::solver::state::Solver;
-use crate::solver::state::relaxation::{FROM_REST, RelaxPhase};
 use crate::source::Source;
-
-/// Least length of a step on the way to equilibrium, as a share of the bound from the material. A stop
-/// shortens the step, and growth recovers that in four steps: if stops follow each other faster, as with
-/// noise that the transfer does not retain, lengths would decrease without limit. The shorter step after a
-/// stop is useful: a stop comes one step late, and so has no effect on motions with a period of only a few
-/// steps.
-const SHORTEST: f64 = 0.5;
 
 impl<const D: usize> Solver<D> {
     /// Length of the next step: the bound from all particles, the job's limits, and `limit`.
-    ///
-    /// A step from rest is shorter: see [`FROM_REST`].
     pub(in crate::solver) fn choose_dt(&self, limit: f64) -> f64 {
         let control = &self.physics.control;
         let bound = if self.clock.bound.is_finite() { self.clock.bound } else { self.free_bound() };
@@ -27,11 +17,7 @@ impl<const D: usize> Solver<D> {
         let mut dt = bound.min(control.dt_max.unwrap_or(f64::INFINITY));
         // Without a bound from material, a longer step disturbs nothing.
         if self.clock.dt > 0.0 && self.clock.bound.is_finite() {
-            let least = if self.physics.equilibrium.is_some() { SHORTEST * bound } else { 0.0 };
-            dt = dt.min((control.growth * self.clock.dt).max(least));
-        }
-        if self.relaxation.phase == RelaxPhase::Stopped {
-            dt *= FROM_REST;
+            dt = dt.min(control.growth * self.clock.dt);
         }
         dt.min(limit)
     }

@@ -15,16 +15,17 @@ mod press;
 mod pressure;
 
 use crate::boundary::bodies::PairLaw;
+use crate::leapfrog::Lengths;
 use crate::solver::state::Solver;
 use crate::solver::state::bookings::ForceAndWork;
 use crate::solver::state::phases::Phase;
 
 impl<const D: usize> Solver<D> {
-    /// Collective. The real nodes at which bodies press on each other in a step of length `dt` (s), block by
-    /// block; nothing where there is none.
-    pub(super) fn meeting_nodes(&mut self, dt: f64) -> Vec<u64> {
+    /// Collective. The real nodes at which bodies press on each other in a step, block by block; nothing
+    /// where there is none, and between two steps.
+    pub(super) fn meeting_nodes(&mut self, is_step: bool) -> Vec<u64> {
         // What particles have between two steps needs no holding apart.
-        if self.grid.others.is_empty() || dt <= 0.0 {
+        if self.grid.others.is_empty() || !is_step {
             return Vec::new();
         }
         self.fade_pressures();
@@ -41,16 +42,16 @@ impl<const D: usize> Solver<D> {
         !self.physics.body_contacts.pairs.iter().all(|pair| pair.law == PairLaw::Sticky)
     }
 
-    /// Collective over neighbours. Gives the nodes where bodies meet the impulses of their contact over `dt`,
-    /// s. With `found`: the places of surfaces are known there.
-    pub(super) fn press_bodies(&mut self, meets: &[u64], found: bool, dt: f64) {
+    /// Collective over neighbours. Gives the nodes where bodies meet the impulses of their contact in a step
+    /// of these lengths. With `found`: the places of surfaces are known there.
+    pub(super) fn press_bodies(&mut self, meets: &[u64], found: bool, lengths: Lengths) {
         if meets.is_empty() {
             return;
         }
         if self.has_surfaces_between() {
             self.find_hats();
         }
-        let forces = self.press(meets, dt);
+        let forces = self.press(meets, lengths);
         if found {
             self.carry_pressures(&forces);
         }
@@ -59,6 +60,6 @@ impl<const D: usize> Solver<D> {
     /// Collective. Mean force of each contact of the job on its first side since the last row of the history,
     /// and its work since the start.
     pub fn body_totals(&self) -> Vec<ForceAndWork> {
-        self.body_sums.force_and_work(&self.comm, self.clock.time)
+        self.body_sums.force_and_work(&self.comm, self.time_of_velocities())
     }
 }

@@ -6,6 +6,7 @@ use crate::boundary::bodies::{Meeting, Pair, PairLaw};
 use crate::grid::mask::{bits, block_nodes};
 use crate::grid::{GridPlan, NodeFields};
 use crate::kernel::Coordinates;
+use crate::leapfrog::Lengths;
 use crate::solver::state::Solver;
 use crate::solver::state::grid::Solids;
 use crate::solver::state::phases::Phase;
@@ -72,7 +73,7 @@ impl<const D: usize> Solver<D> {
     /// Not collective. Applies the impulses of contact at the real nodes where fields meet, given block by
     /// block, and sums impulse and work over the nodes that this rank counts. Returns the normal forces at
     /// these nodes if particles carry their pressure.
-    pub(super) fn press(&mut self, meets: &[u64], dt: f64) -> Vec<NormalForce> {
+    pub(super) fn press(&mut self, meets: &[u64], lengths: Lengths) -> Vec<NormalForce> {
         let grid = &self.grid;
         let press = Press {
             plan: &grid.plan,
@@ -82,7 +83,7 @@ impl<const D: usize> Solver<D> {
             contacts: &self.physics.body_contacts,
             coordinates: self.physics.coordinates,
             finds_forces: self.physics.followed_columns().contact_pressure.is_some(),
-            dt,
+            lengths,
         };
         let pressed: Vec<Pressed<D>> = self.phases.time(Phase::Nodes, || {
             let blocks = meets.par_iter().enumerate().filter(|(_, nodes)| **nodes != 0);
@@ -121,7 +122,7 @@ struct Press<'a, const D: usize> {
     coordinates: Coordinates,
     /// Whether normal forces are needed.
     finds_forces: bool,
-    dt: f64,
+    lengths: Lengths,
 }
 
 impl<const D: usize> Press<'_, D> {
@@ -212,7 +213,7 @@ impl<const D: usize> Press<'_, D> {
         let cell = plan.cell(plan.blocks[node / block_nodes(D)].level);
         if law == PairLaw::Sticky {
             let anywhere = Meeting { normal: [0.0; D], gap: 0.0, area: 0.0 };
-            let impulse = law.impulse(&relative, masses, &anywhere, cell, self.dt);
+            let impulse = law.impulse(&relative, masses, &anywhere, cell, self.lengths);
             return Some(Exchange { impulse, pressed: [0.0; 2] });
         }
         let sums = bodies.map(|body| {
@@ -222,8 +223,8 @@ impl<const D: usize> Press<'_, D> {
         let on = plan.face_nodes.binary_search_by_key(&(node as u32), |(node, _)| *node);
         let on_faces = on.map_or(0, |place| plan.face_nodes[place].1);
         let meeting = Meeting::new(sums, self.hats[node], cell, on_faces)?;
-        let impulse = law.impulse(&relative, masses, &meeting, cell, self.dt);
+        let impulse = law.impulse(&relative, masses, &meeting, cell, self.lengths);
         let along = (0..D).fold(0.0, |sum, a| impulse[a].mul_add(meeting.normal[a], sum));
-        Some(Exchange { impulse, pressed: [along / self.dt, meeting.area] })
+        Some(Exchange { impulse, pressed: [along / self.lengths.kick, meeting.area] })
     }
 }

@@ -7,6 +7,7 @@ use crate::boundary::motion::Rate;
 use crate::geometry::Aabb;
 use crate::grid::leaf_geometry::leaf_box;
 use crate::kernel::{Select, domain};
+use crate::leapfrog::Lengths;
 use crate::particle::chunk::{Chunk, Layout};
 use crate::particle::volume::volume;
 use crate::solver::sorting::bins::BoxWidths;
@@ -24,7 +25,12 @@ impl<const D: usize> Solver<D> {
     /// Not collective. The particles of each own leaf in reach of the colliders that act on particles that
     /// move with the velocity field numbered `field`, and in `near` those of all fields so far that may reach
     /// one in this step.
-    pub(super) fn find_contacts(&mut self, field: usize, dt: f64, rates: &[Rate<D>]) -> Vec<InContact<D>> {
+    pub(super) fn find_contacts(
+        &mut self,
+        field: usize,
+        lengths: Lengths,
+        rates: &[Rate<D>],
+    ) -> Vec<InContact<D>> {
         let colliders: Vec<_> =
             self.physics.colliders.iter().enumerate().zip(&self.contacts.states).zip(rates).collect();
         let scheme = self.physics.scheme();
@@ -80,7 +86,7 @@ impl<const D: usize> Solver<D> {
                         let reach = |normal: &[f64; D], surface: &[f64; D], touching: f64| {
                             let inward =
                                 (0..D).fold(0.0, |sum, a| (surface[a] - v[a]).mul_add(normal[a], sum));
-                            (AHEAD * dt).mul_add(inward.max(0.0), REACH * touching)
+                            (AHEAD * lengths.drift).mul_add(inward.max(0.0), REACH * touching)
                         };
                         let density = match collider.contact.drag() > 0.0 {
                             true => chunk.column(Layout::<D>::MASS)[p as usize] / volume(chunk, p as usize),
@@ -88,7 +94,7 @@ impl<const D: usize> Solver<D> {
                         };
                         let of_box = (half, density);
                         if let Some(contact) =
-                            Touching::new(number, collider, (&state.pose, rate), &x, of_box, dt, reach)
+                            Touching::new(number, collider, (&state.pose, rate), &x, of_box, lengths, reach)
                         {
                             found.push(chunk, p as usize, contact);
                         }

@@ -29,6 +29,7 @@ use crate::boundary::Collider;
 use crate::boundary::Touching;
 use crate::boundary::motion::Rate;
 use crate::exact_sum::ExactSum;
+use crate::leapfrog::Lengths;
 use crate::particle::Chunk;
 use crate::solver::sorting::bins::BinMissing;
 use crate::solver::state::Solver;
@@ -62,11 +63,11 @@ impl<const D: usize> Solver<D> {
     pub(super) fn hold_particles(
         &mut self,
         field: usize,
-        dt: f64,
+        lengths: Lengths,
         rates: &[Rate<D>],
         sums: &mut [[ExactSum; SUMS]],
     ) -> Result<(), BinMissing> {
-        let found = self.find_contacts(field, dt, rates);
+        let found = self.find_contacts(field, lengths, rates);
         let (mut chunks, mut touching): (Vec<_>, Vec<_>) =
             found.into_iter().map(|leaf| (leaf.particles, leaf.touching)).unzip();
         let is_any = chunks.iter().any(|chunk: &Chunk<D>| !chunk.is_empty());
@@ -93,7 +94,7 @@ impl<const D: usize> Solver<D> {
             self.hold_at_nodes(field, rates, sums);
             self.hold_behind(&behind, rates, sums);
             // Faces that absorb waves have had their share of the step.
-            self.apply_faces(field, 0.0, true);
+            self.apply_faces(field, Lengths::NONE, true);
             self.grid.swap(&mut other);
         }
         self.grid.swap(&mut other);

@@ -5,6 +5,7 @@ use crate::grid::leaf_geometry::leaf_box;
 use crate::grid::mask::{block_nodes, node_of_bit, offset, offset_count, offset_index};
 use crate::grid::plan::{NO_BLOCK, arena_index};
 use crate::kernel::{ARENA_EDGE, BLOCK, Row};
+use crate::leapfrog::Lengths;
 use crate::solver::state::inside::{Inside, Plane, SAME};
 
 /// Corners of a cell, at most.
@@ -223,15 +224,21 @@ impl<const D: usize> Foot<D> {
         self.normal.map(|n| along.mul_add((1.0 - n * n).max(0.0).sqrt(), n.abs()))
     }
 
-    /// The contact across a gap (m) in a step of length `dt` (s) with a surface that moves so fast, m/s.
-    pub(super) fn touching(&self, law: Contact, surface: [f64; D], gap: f64, dt: f64) -> Touching<D> {
-        let over = if gap <= gap::STICKS * self.cell { dt } else { 0.0 };
+    /// The contact across a gap (m) in a step of these lengths with a surface that moves so fast, m/s.
+    pub(super) fn touching(
+        &self,
+        law: Contact,
+        surface: [f64; D],
+        gap: f64,
+        lengths: Lengths,
+    ) -> Touching<D> {
+        let over = if gap <= gap::STICKS * self.cell { lengths.kick } else { 0.0 };
         Touching {
             collider: self.collider,
             normal: self.normal,
             arm: [0.0; D],
             surface,
-            bounds: Bounds::across(gap, self.cell, dt).under(law),
+            bounds: Bounds::across(gap, self.cell, lengths.drift).under(law),
             law,
             // Of an area of 1 m² and a density of 1 kg/m³, until these are known.
             sticking: law.cohesion() * over,

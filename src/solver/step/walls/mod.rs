@@ -37,6 +37,7 @@ use crate::exact_sum::ExactSum;
 use crate::grid::Window;
 use crate::grid::mask::{bits, block_nodes};
 use crate::grid::plan::needed_nodes::nodes_in_domain;
+use crate::leapfrog::Lengths;
 use crate::solver::sorting::bins::BinMissing;
 use crate::solver::state::Solver;
 use crate::solver::state::bookings::SUMS;
@@ -66,14 +67,14 @@ impl<const D: usize> Solver<D> {
     }
 
     /// Collective over neighbours. Finds where the material of each velocity field is near surfaces that it
-    /// may touch in a step of length `dt` (s): at the nodes `meets` where bodies meet, if there are any, and
+    /// may touch in a step of these lengths: at the nodes `meets` where bodies meet, if there are any, and
     /// at walls.
     ///
     /// # Errors
     /// A box that needs a bin outside the plan, on the rank that has it.
-    pub(super) fn find_surfaces(&mut self, meets: &[u64], dt: f64) -> Result<(), BinMissing> {
+    pub(super) fn find_surfaces(&mut self, meets: &[u64], lengths: Lengths) -> Result<(), BinMissing> {
         self.grid.walls.known_over = None;
-        if dt <= 0.0 {
+        if lengths.drift <= 0.0 {
             return Ok(());
         }
         let is_between = !meets.is_empty() && self.has_surfaces_between();
@@ -87,7 +88,7 @@ impl<const D: usize> Solver<D> {
             true => self.wall_nodes(),
             false => vec![0; self.grid.plan.blocks.len()],
         };
-        self.grid.walls.known_over = is_near.then_some(dt);
+        self.grid.walls.known_over = is_near.then_some(lengths);
         let is_asked: Vec<bool> = (0..=self.grid.others.len())
             .map(|field| is_between || (is_near && self.asks_for_gaps(field)))
             .collect();
@@ -160,7 +161,7 @@ impl<const D: usize> Solver<D> {
     /// place of the first, to the conditions of colliders at feet, with those of nodes and faces. Adds
     /// impulse and angular impulse on each collider.
     pub(super) fn hold_at_feet(&mut self, field: usize, rates: &[Rate<D>], sums: &mut [[ExactSum; SUMS]]) {
-        let Some(dt) = self.grid.walls.known_over.filter(|_| self.has_feet(field)) else { return };
+        let Some(lengths) = self.grid.walls.known_over.filter(|_| self.has_feet(field)) else { return };
         let physics = &self.physics;
         let acts = |number: usize| physics.acts_at_feet(field, &physics.colliders[number]);
         let mut all = self
@@ -171,7 +172,7 @@ impl<const D: usize> Solver<D> {
         self.grid.swap(&mut other);
         let bins = all.iter().map(|leaf| (leaf.bin, Window::FULL));
         self.grid.arenas.occupy(&self.grid.plan, &self.grid.seam, bins);
-        let covered = self.find_gaps(field, dt, rates, &mut all, &other);
+        let covered = self.find_gaps(field, lengths, rates, &mut all, &other);
         self.find_compliances_at_feet(field, &mut all, &covered, &other);
         for _ in 0..SWEEPS {
             self.take_velocities(&other);
@@ -181,7 +182,7 @@ impl<const D: usize> Solver<D> {
             self.add_impulses(&mut other);
             self.grid.swap(&mut other);
             self.hold_at_nodes(field, rates, sums);
-            self.apply_faces(field, 0.0, true);
+            self.apply_faces(field, Lengths::NONE, true);
             self.grid.swap(&mut other);
         }
         self.take_along(field, &all, &covered, &mut other, rates, sums);

@@ -10,6 +10,7 @@ use crate::grid::Window;
 use crate::grid::mask::block_nodes;
 use crate::grid::plan::NO_BLOCK;
 use crate::kernel::Row;
+use crate::leapfrog::Lengths;
 use crate::solver::state::Solver;
 use crate::solver::state::bookings::SUMS;
 use crate::solver::state::grid::{Grid, VelocityField};
@@ -82,7 +83,7 @@ impl<const D: usize> Solver<D> {
     pub(super) fn find_gaps(
         &mut self,
         field: usize,
-        dt: f64,
+        lengths: Lengths,
         rates: &[Rate<D>],
         all: &mut [LeafFeet<D>],
         other: &VelocityField<D>,
@@ -132,7 +133,7 @@ impl<const D: usize> Solver<D> {
                 *touching = gap.map(|gap| {
                     let surface =
                         collider.velocity_at(&foot.at, &states[foot.collider].pose, &rates[foot.collider]);
-                    foot.touching(collider.contact, surface, gap, dt)
+                    foot.touching(collider.contact, surface, gap, lengths)
                 });
             }
         }
