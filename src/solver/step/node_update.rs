@@ -19,12 +19,12 @@ use crate::solver::state::phases::Phase;
 use crate::solver::state::walls::Walls;
 
 impl<const D: usize> Solver<D> {
-    /// Collective over neighbours. `v_j = p_j / m_j + Δt g` on real nodes with the kick Δt, then loads, ties of surface nodes,
-    /// contact between bodies, the conditions of domain faces and those of colliders, with those of faces
-    /// again in each sweep, so that nothing is driven out of the domain. Returns impulse and angular impulse
-    /// on each collider from nodes and particles of this rank, and whether all particles in contact have
-    /// bins. With no length it shows the velocities between two steps: bodies and particles are not held,
-    /// and nothing is booked.
+    /// Collective over neighbours. `v_j = p_j / m_j + Δt g` on real nodes with the kick Δt, then loads, ties
+    /// of surface nodes, contact between bodies, the conditions of domain faces and those of colliders, with
+    /// those of faces again in each sweep, so that nothing is driven out of the domain. Returns impulse and
+    /// angular impulse on each collider from nodes and particles of this rank, and whether all particles in
+    /// contact have bins. With no length it shows the velocities between two steps: bodies and particles are
+    /// not held, and nothing is booked.
     pub(in crate::solver) fn update_node_velocities(
         &mut self,
         lengths: Lengths,
