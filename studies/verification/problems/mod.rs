@@ -24,8 +24,9 @@ pub(crate) mod weights;
 pub(crate) type Problem = fn(&Runs, &mut Page);
 
 /// All of them, in the order of the page.
-pub(crate) const ALL: [(&str, Problem); 19] = [
+pub(crate) const ALL: [(&str, Problem); 20] = [
     ("bar", bar::section),
+    ("in_time", bar::in_time),
     ("manufactured", manufactured::square),
     ("manufactured_3d", manufactured::cube),
     ("rings", manufactured::rings),

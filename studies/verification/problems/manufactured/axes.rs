@@ -131,6 +131,18 @@ pub(crate) fn square(runs: &Runs, page: &mut Page) {
         }
         studies.push(study);
     }
+    if runs.is_full() {
+        // In longer steps the error in time would show.
+        let points = [32, 64].map(|count| {
+            let (mut settings, _) = cells(count);
+            settings.extend([APIC[0].to_owned(), "time.cfl=0.3".into()]);
+            let run = format!("mms_apic_long_{count}");
+            (count as f64, error(runs, "verification/axis_aligned_2d", &run, &settings, PHASES_2D).0)
+        });
+        let study = Study { name: "apic, Courant number 0.3".into(), points: points.into() };
+        page.line("mms.order.apic_long", study.last_order());
+        studies.push(study);
+    }
     show(page, "manufactured", "Along the axes, 2D: greatest error over A", studies);
 }
 

@@ -63,7 +63,7 @@ pub(crate) fn section(runs: &Runs, page: &mut Page) {
         "*Generalised vortex* ([job](../jobs/verification/vortex.toml)): a ring of 0.75 to 1.25 m (neo-Hookean, E = 1 kPa, nu = 0.3, 1000 kg/m3) is turned by \
          alpha = A sin(pi t) (4 R - 5)^2 (4 R - 3)^2 for one second, A = 0.1: shear up to 0.7, no change of volume, no traction on the rims (Kamojjala et al. 2015). *Expanding ring* ([job](../jobs/verification/expanding_ring.toml)): a quarter of a ring of 0.4 to \
          0.6 m (E = 10 MPa, nu = 0) breathes with u = A sin(100 pi t) (c3 R^3 + c2 R^2 + c1 R), A = 0.1, for one period (Wallstedt and Guilkey 2008). Both forces agree with tables of an independent code. The error is the root mean square \
-         over the volume, of the worst of all outputs, over A; FLIP, Courant number 0.1. *2:1* has cells of half the size on one side of a line through the middle of the ring (x < 0 in the vortex, y < x in the ring), counted by the coarse cells. Exercises shear, curved free surfaces and boxes that stay parallel to the axes. It is limited by the order of the step.\n",
+         over the volume, of the worst of all outputs, over A; FLIP, Courant number 0.1. *2:1* has cells of half the size on one side of a line through the middle of the ring (x < 0 in the vortex, y < x in the ring), counted by the coarse cells. Exercises shear, curved free surfaces and boxes that stay parallel to the axes.\n",
     );
     let problems: [(&str, &str, Exact, f64, &str); 2] = [
         (
