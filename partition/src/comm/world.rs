@@ -37,7 +37,7 @@ pub enum CommError {
         "found {0} processes started by a launcher; this program is built without MPI and has one rank: start it by \
          itself, with --threads for several cores, or use a build with MPI"
     )]
-    WithoutMpi(u32),
+    WithoutMpi(usize),
 }
 
 /// The running MPI library and all its ranks.
