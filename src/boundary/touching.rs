@@ -29,6 +29,8 @@ pub struct Touching<const D: usize> {
     pub normal: [f64; D],
     /// From the centre of the particle to the point of contact on the surface, m.
     pub arm: [f64; D],
+    /// From its centre of mass to that point, m: another way with rings.
+    pub lever: [f64; D],
     /// Velocity of the collider there, m/s.
     pub surface: [f64; D],
     /// Bounds on the velocity along the normal relative to it; the greatest is finite where the surface pulls
@@ -90,6 +92,7 @@ impl<const D: usize> Touching<D> {
             collider: number,
             normal,
             arm,
+            lever: arm,
             surface,
             bounds,
             law,
@@ -98,6 +101,16 @@ impl<const D: usize> Touching<D> {
             compliance: [0.0; 2],
             impulse,
         })
+    }
+
+    /// The contact of a ring that has this circumference at the point of contact, m, and its centre of mass
+    /// `ahead` of its centre along the radius, m.
+    #[must_use]
+    pub fn around(mut self, circumference: f64, ahead: f64) -> Self {
+        self.lever[0] -= ahead;
+        self.sticking *= circumference;
+        self.drag *= circumference;
+        self
     }
 
     /// Corrects the impulse for the velocity of the particle at the point of contact, m/s; returns its

@@ -235,7 +235,44 @@ fn level_ground_stays_at_rest() {
     assert!(most < 1e-18 * history.last("elastic_energy"), "{most}");
 }
 
-/// Sand that falls round a punch, with F-bar, on two levels: the same bits on any ranks and across a restart.
+/// A rubber in a smooth tube under a smooth piston, both at particles: the forces of an oedometer on the whole
+/// area and circumference. Cohesion of the tube bears its strength times the circumference at its wall.
+#[test]
+fn a_tube_and_a_piston_act_on_the_whole_circumference() {
+    let tube = |law: &str| {
+        format!(
+            "[tree]\nbase_level = 3\n[[colliders]]\nname = 'tube'\nacts_on = 'particles'\ncontact = {{ {law} }}\n\
+             shape = {{ kind = 'box', min = [0.25, -0.1], max = [0.45, 0.6] }}\n"
+        )
+    };
+    let (young, nu, radius, stretch) = (1e6, 0.3, 0.25, 0.98_f64);
+    let pressed = "[[bodies]]\nname = 'block'\nmaterial = 'rubber'\n\
+        shape = { kind = 'box', min = [0, 0], max = [0.25, 0.25] }\n\
+        [[colliders]]\nname = 'piston'\nacts_on = 'particles'\ncontact = { kind = 'slip' }\n\
+        shape = { kind = 'box', min = [-0.3, 0.25], max = [0.3, 0.45] }\n\
+        motion = { kind = 'table', rows = [{ time = 0 }, { time = 0.1, translation = [0, -0.005] }, { time = 1, translation = [0, -0.005] }] }\n\
+        [[loads]]\nname = 'drag'\nkind = 'damping'\nrate = 60\nshape = { kind = 'box', min = [0, 0], max = [0.5, 0.5] }\n\
+        [time]\nend = 0.2\n[history]\nevery_steps = 50\n";
+    let history = history("pressed", &job([0.5, 0.5], &(tube("kind = 'slip'") + pressed)));
+    // Cauchy stress of the law τ = λ tr ε + 2 μ ε.
+    let lateral = young * nu / ((1.0 + nu) * (1.0 - 2.0 * nu)) * -stretch.ln() / stretch;
+    let axial = lateral * (1.0 - nu) / nu;
+    let piston = history.last("force_piston_y") / (axial * PI * radius * radius);
+    let tube_force = history.last("force_tube_x") / (lateral * TAU * radius * radius * stretch);
+    println!("piston {piston}, tube {tube_force} of the closed form");
+    assert!((piston - 1.0).abs() < 0.03 && (tube_force - 1.0).abs() < 0.03);
+
+    let moves = "[[bodies]]\nname = 'block'\nmaterial = 'rubber'\nvelocity = [0, 1]\n\
+        shape = { kind = 'box', min = [0, 0.125], max = [0.25, 0.375] }\n\
+        [time]\nend = 0.01\n[history]\nevery_steps = 1\n";
+    let cohesive = tube("kind = 'separating', cohesion = 1000");
+    let history = self::history("stuck", &job([0.5, 0.5], &(cohesive + moves)));
+    let force = history.last("force_tube_y") / (1000.0 * TAU * radius * 0.25);
+    println!("cohesion {force} of the closed form");
+    assert!((force - 1.0).abs() < 2e-3);
+}
+
+/// Sand that falls round a punch at nodes and a ring at particles, with F-bar, on two levels: the same bits on any ranks and across a restart.
 #[test]
 fn results_are_the_same_on_any_ranks_and_across_a_restart() {
     let text = "version = 1\ndimension = 2\ngeometry = 'axisymmetric'\ngravity = [0, -9.81]\n\
@@ -247,6 +284,8 @@ fn results_are_the_same_on_any_ranks_and_across_a_restart() {
         shape = { kind = 'box', min = [0, 0], max = [0.75, 0.75] }\n\
         [[colliders]]\nname = 'punch'\nshape = { kind = 'box', min = [-1, 0.75], max = [0.2, 0.95] }\n\
         contact = { kind = 'separating', friction = 0.3 }\nmotion = { kind = 'steady', velocity = [0, -0.5] }\n\
+        [[colliders]]\nname = 'ring'\nshape = { kind = 'box', min = [0.4, 0.76], max = [0.6, 0.95] }\nacts_on = 'particles'\n\
+        contact = { kind = 'separating', friction = 0.3 }\nmotion = { kind = 'steady', velocity = [0, -0.6] }\n\
         [[loads]]\nname = 'rim'\nkind = 'pressure'\npressure = 200\nfacing = [1, 0]\n\
         [numerics]\nf_bar = true\n[time]\nend = 0.15\n[output]\nevery = 0.05\npicture = false\n\
         [checkpoint]\nevery_steps = 20\nkeep = 9\n[history]\nevery_steps = 5\nface_forces = true\n";

@@ -7,7 +7,7 @@ use crate::boundary::Collider as Solid;
 use crate::geometry::written::Shape;
 use crate::job::parse::source::Path;
 use crate::job::problem::{CollapseLaw, Coordinates, Field, MaterialSetup};
-use crate::job::schema::colliders::{ActsOn, Collider, Motion, Row};
+use crate::job::schema::colliders::{Collider, Motion, Row};
 use crate::job::schema::common::Spin;
 use crate::job::schema::job_file::{self as file, Boundaries, Face, Geometry, JobFile, Quantity};
 
@@ -169,8 +169,6 @@ fn collider(
     refuse: &mut impl FnMut(bool, Path, &'static str, &'static str),
 ) {
     let along = "a motion along the axis, y, without rotation";
-    let on_particles = collider.acts_on == Some(ActsOn::Particles);
-    refuse(on_particles, path.key("acts_on"), "a collider that acts on particles", "\"nodes\"");
     let here = path.key("motion");
     match &collider.motion {
         None | Some(Motion::Fixed {}) => {}

@@ -7,7 +7,8 @@
 //! velocity `Σ W_j v_j` of that point, which the law asks for, is the adjoint. All impulses together are the
 //! solution of a problem of complementarity (Moreau 1988, Jean 1999); here it is sought from zero by a fixed
 //! number of Jacobi's sweeps, each scaled by the response to an impulse on all particles at once, so that
-//! uniform pressure is exact after the first.
+//! uniform pressure is exact after the first. For rings x is the centre of mass, about which their weights are
+//! taken, and J the impulse on the whole ring.
 //!
 //! The particles in contact are copied into chunks of their own, which pass through bins, sums over ranks and
 //! constrained nodes like all others: no bit depends on ranks.

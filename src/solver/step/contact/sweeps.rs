@@ -77,7 +77,7 @@ impl<const D: usize> Solver<D> {
         let scheme = self.physics.scheme();
         for (leaf, chunk) in chunks.iter_mut().enumerate() {
             for p in 0..chunk.len() {
-                let (j, arm) = (impulse(leaf, p), &touching[leaf][p].arm);
+                let (j, arm) = (impulse(leaf, p), &touching[leaf][p].lever);
                 chunk.write(Layout::<D>::VELOCITY, p, &j);
                 for k in 0..D {
                     // The affine matrix of APIC is not yet divided by D.
@@ -145,7 +145,7 @@ impl<const D: usize> Solver<D> {
                 let Scratch { kernel, arena, gathered } = scratch;
                 let mut take = |p: usize, gathered: &Gathered<D>| {
                     let (v, affine) = (gathered.velocity(), gathered.affine());
-                    let (arm, spread) = (&touching[leaf][p].arm, &spreads[leaf][p]);
+                    let (arm, spread) = (&touching[leaf][p].lever, &spreads[leaf][p]);
                     velocities[p] = std::array::from_fn(|i| {
                         (0..D).fold(v[i], |sum, k| affine[i][k].mul_add(arm[k] / spread[k], sum))
                     });

@@ -237,6 +237,7 @@ impl<const D: usize> Foot<D> {
             collider: self.collider,
             normal: self.normal,
             arm: [0.0; D],
+            lever: [0.0; D],
             surface,
             bounds: Bounds::across(gap, self.cell, lengths.drift).under(law),
             law,
