@@ -10,7 +10,9 @@
 //! | `camera.rs` | projection from space to pixels |
 //! | `scene.rs`, `solids.rs`, `tree.rs` | particles with their light; colliders; leaves |
 //! | `boxes.rs`, `arrows.rs` | widths of particles; vectors |
-//! | `canvas.rs`, `colour.rs`, `scales.rs`, `font.rs` | an image and its file; colours; legends; letters |
+//! | `copies.rs` | mirror images and bodies of revolution |
+//! | `canvas.rs`, `colour.rs`, `scales.rs` | an image and its file; colours; legends |
+//! | `heading.rs`, `font.rs` | title and caption; letters |
 //! | `source/` | quantities of a file, and those derived from them |
 
 use std::path::{Path, PathBuf};
@@ -18,7 +20,6 @@ use std::path::{Path, PathBuf};
 use partition::comm::Comm;
 
 use super::hdf5_file::{FileError, Reader};
-use super::revolve::{self, Revolve};
 use super::snapshot::content::fields::Values;
 use super::snapshot::{Header, PointField, View};
 use crate::particle::chunk::Layout;
@@ -29,7 +30,9 @@ mod boxes;
 mod camera;
 mod canvas;
 mod colour;
+mod copies;
 mod font;
+mod heading;
 mod scales;
 mod scene;
 mod settings;
@@ -44,6 +47,7 @@ use camera::{Bounds, Camera};
 use canvas::Canvas;
 pub use colour::Map;
 pub(crate) use colour::further;
+use heading::Heading;
 use scales::{Plot, colour_bar, legend, nice};
 use scene::{Looks, Raster, Splat};
 pub use settings::{Clip, Look, Settings, place};
@@ -96,8 +100,6 @@ impl Tint {
 
 /// Free space beside the drawing: left, right, top, bottom, in units of the layout.
 const MARGINS: [f64; 4] = [40.0, 190.0, 110.0, 60.0];
-/// Most lines of a title.
-const TITLE_LINES: usize = 3;
 /// Radius of balls over the half width of the particles' boxes, so that no gaps are seen between them.
 const LARGER: f64 = 1.2;
 
@@ -511,99 +513,6 @@ impl Drawing {
         Some(format!(
             "the clip {clip} keeps no particle; expected a place among them, {name} from {low} to {high}"
         ))
-    }
-
-    /// The bodies of revolution in space of a plane drawing, without leaves.
-    ///
-    /// # Errors
-    /// In words: see [`revolve::copies`].
-    fn revolved(self, header: &Header, revolve: Revolve) -> Result<Self, String> {
-        let Self { splats, mut vectors, domain: Bounds { low, high }, .. } = self;
-        let sections = splats.iter().map(|splat| (splat.position[0], splat.radii[0] / LARGER));
-        let copies = revolve::copies(header, sections, revolve)?;
-        if !vectors.each.is_empty() {
-            vectors.each = copies.iter().map(|&(p, turn)| turn.vector(vectors.each[p])).collect();
-        }
-        let copied = copies.iter().map(|&(p, turn)| {
-            let Splat { position, radii: [radius, height, _], value } = splats[p];
-            Splat { position: turn.place(position), radii: [radius, radius, height], value }
-        });
-        let (splats, reach) = (copied.collect(), high[0]);
-        let domain = Bounds { low: [-reach, -reach, low[1]], high: [reach, reach, high[1]] };
-        let solids = self.solids.into_iter().map(|solid| solid.revolved(revolve)).collect();
-        Ok(Self { flat: false, domain, splats, vectors, solids, leaves: Vec::new(), ..self })
-    }
-
-    /// Adds the mirror images behind planes of symmetry. Returns the frame of all.
-    fn mirror(&mut self, settings: &Settings, mut frame: Bounds) -> Bounds {
-        for axis in (0..3).filter(|&axis| settings.mirror[axis]) {
-            let plane = self.domain.low[axis];
-            let behind: Vec<Splat> = self
-                .splats
-                .iter()
-                .map(|splat| {
-                    let mut image = *splat;
-                    image.position[axis] = 2.0 * plane - image.position[axis];
-                    image
-                })
-                .collect();
-            self.splats.extend(behind);
-            let behind: Vec<[f64; 3]> = self
-                .vectors
-                .each
-                .iter()
-                .map(|vector| std::array::from_fn(|i| if i == axis { -vector[i] } else { vector[i] }))
-                .collect();
-            self.vectors.each.extend(behind);
-            let images: Vec<_> = self
-                .leaves
-                .iter()
-                .map(|(corner, edge)| {
-                    let mut image = *corner;
-                    image[axis] = 2.0 * plane - image[axis] - edge;
-                    (image, *edge)
-                })
-                .collect();
-            self.leaves.extend(images);
-            self.solids = std::mem::take(&mut self.solids)
-                .into_iter()
-                .map(|solid| solid.mirrored(axis, plane))
-                .collect();
-            frame.low[axis] = 2.0 * plane - frame.high[axis];
-        }
-        frame
-    }
-}
-
-/// Title and caption in lines.
-struct Heading {
-    title: Vec<String>,
-    caption: Vec<String>,
-    /// Pixels that they need beside those of a line each.
-    extra: i64,
-}
-
-impl Heading {
-    fn new(canvas: &Canvas, title: &str, caption: &str) -> Self {
-        let width = canvas.width as i64 - 2 * canvas.px(24.0);
-        let (title, caption) =
-            (canvas.lines(3.0, title, width, TITLE_LINES), canvas.lines(2.0, caption, width, TITLE_LINES));
-        let more = |lines: &[String], height: f64| canvas.px(height * lines.len().saturating_sub(1) as f64);
-        let extra = more(&title, 32.0) + more(&caption, 24.0);
-        Self { title, caption, extra }
-    }
-
-    fn write(&self, canvas: &mut Canvas, paper: &colour::Paper) {
-        let (left, mut row) = (canvas.px(24.0), canvas.px(20.0));
-        for line in &self.title {
-            canvas.text(left, row, 3.0, line, paper.ink);
-            row += canvas.px(32.0);
-        }
-        let mut row = row.max(canvas.px(52.0)) + canvas.px(8.0);
-        for line in &self.caption {
-            canvas.text(left, row, 2.0, line, paper.ink);
-            row += canvas.px(24.0);
-        }
     }
 }
 
