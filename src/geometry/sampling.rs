@@ -38,8 +38,8 @@ pub enum Sampling<const D: usize> {
     Lattice,
     /// On the lattice; parts of its boxes at the surface of the body.
     Fitted,
-    /// At random about the points of the lattice.
-    Jittered,
+    /// At random about the points of the lattice, by a seed.
+    Jittered(u64),
     /// As blue noise.
     Poisson(Arc<Tile<D>>),
 }
@@ -53,9 +53,9 @@ pub struct Tile<const D: usize> {
 }
 
 impl<const D: usize> Sampling<D> {
-    /// Blue noise for leaves with so many points along an edge.
-    pub fn poisson(along_leaf: usize) -> Self {
-        Self::Poisson(Arc::new(Tile::new(along_leaf)))
+    /// Blue noise for leaves with so many points along an edge, by a seed.
+    pub fn poisson(along_leaf: usize, seed: u64) -> Self {
+        Self::Poisson(Arc::new(Tile::new(along_leaf, seed)))
     }
 
     /// Displacement from a point of the lattice to its particle, in distances of particles; leaves of
@@ -63,8 +63,9 @@ impl<const D: usize> Sampling<D> {
     pub fn way(&self, index: &[u64; D], level: u8) -> [f64; D] {
         match self {
             Self::Lattice | Self::Fitted => [0.0; D],
-            Self::Jittered => {
-                let seed = index.iter().fold(u64::from(level), |seed, &i| mixed(seed ^ i));
+            Self::Jittered(seed) => {
+                let first = u64::from(level) ^ start_of(*seed);
+                let seed = index.iter().fold(first, |seed, &i| mixed(seed ^ i));
                 std::array::from_fn(|a| JITTER * part(mixed(seed.wrapping_add(a as u64))))
             }
             Self::Poisson(tile) => tile.ways[tile.number(&index.map(|i| (i % tile.edge as u64) as usize))],
@@ -73,8 +74,8 @@ impl<const D: usize> Sampling<D> {
 }
 
 impl<const D: usize> Tile<D> {
-    /// For leaves with so many points along an edge.
-    fn new(along_leaf: usize) -> Self {
+    /// For leaves with so many points along an edge, by a seed.
+    fn new(along_leaf: usize, seed: u64) -> Self {
         let leaves = (longest(D) / along_leaf.max(1)).clamp(1, 4);
         let edge = along_leaf * leaves;
         let mut tile = Self { edge, ways: Vec::new() };
@@ -83,7 +84,7 @@ impl<const D: usize> Tile<D> {
             (0..cells).map(|cell| tile.place(cell).map(|i| i as f64 + 0.5)).collect();
         let leaf = along_leaf as f64;
         let start = |cell: usize, a: usize| {
-            let x = LOOSE.mul_add(part(mixed((cell * D + a) as u64)), lattice[cell][a]);
+            let x = LOOSE.mul_add(part(mixed((cell * D + a) as u64 ^ start_of(seed))), lattice[cell][a]);
             // A point beyond its leaf is reflected at the face.
             let first = (lattice[cell][a] / leaf).floor() * leaf;
             let inside = (x - first).abs();
@@ -158,6 +159,11 @@ impl<const D: usize> Tile<D> {
     }
 }
 
+/// What a seed changes in the numbers that are mixed: nothing if it is 0, the default.
+fn start_of(seed: u64) -> u64 {
+    if seed == 0 { 0 } else { mixed(seed) }
+}
+
 /// A number whose bits depend on all of the bits of another.
 fn mixed(word: u64) -> u64 {
     let mut z = word.wrapping_add(0x9e37_79b9_7f4a_7c15);
@@ -201,14 +207,14 @@ mod tests {
     /// all of its own.
     #[test]
     fn blue_noise_keeps_its_distance() {
-        let (plane, space) = (Sampling::<2>::poisson(8), Sampling::<3>::poisson(8));
+        let (plane, space) = (Sampling::<2>::poisson(8, 0), Sampling::<3>::poisson(8, 3));
         for (found, least) in [(nearest(&plane, 40), 0.7), (nearest(&space, 16), 0.7)] {
             let worst = found.iter().copied().fold(f64::INFINITY, f64::min);
             let mean = found.iter().sum::<f64>() / found.len() as f64;
             println!("least distance {worst:.3}, mean {mean:.3}");
             assert!(worst > least && mean > 0.85, "{worst} {mean}");
         }
-        let jittered = nearest(&Sampling::<2>::Jittered, 40).into_iter().fold(f64::INFINITY, f64::min);
+        let jittered = nearest(&Sampling::<2>::Jittered(0), 40).into_iter().fold(f64::INFINITY, f64::min);
         assert!(jittered < 0.7, "{jittered}");
         for (i, j) in (0..64).flat_map(|i| (0..64).map(move |j| (i, j))) {
             let way = plane.way(&[i, j], 0);
@@ -219,11 +225,27 @@ mod tests {
         }
     }
 
+    #[test]
+    fn seeds_give_other_places() {
+        let of: [fn(u64) -> Sampling<2>; 2] = [|seed| Sampling::poisson(8, seed), Sampling::Jittered];
+        for sampling in of {
+            let places = |seed: u64| -> Vec<[f64; 2]> {
+                let sampling = sampling(seed);
+                (0..64).map(|i| sampling.way(&[i % 8, i / 8], 2)).collect()
+            };
+            assert_eq!(places(7), places(7));
+            let [none, first, second] = [0, 1, 2].map(places);
+            for (i, way) in none.iter().enumerate() {
+                assert!(*way != first[i] && *way != second[i] && first[i] != second[i]);
+            }
+        }
+    }
+
     /// There is no order beyond neighbours: the structure factor along the axes of the lattice, N for a
     /// lattice, stays below 3.
     #[test]
     fn blue_noise_has_no_planes() {
-        let sampling = Sampling::<2>::poisson(8);
+        let sampling = Sampling::<2>::poisson(8, 0);
         for direction in [[1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [1.0, -1.0]] {
             let (mut real, mut imaginary, mut points) = (0.0_f64, 0.0_f64, 0.0);
             for (i, j) in (0..32).flat_map(|i| (0..32).map(move |j| (i, j))) {

@@ -559,10 +559,18 @@ fn is_outflow(boundaries: &file::Boundaries, axis: usize, side: usize) -> bool {
 
 /// Arrangement of the particles of a body.
 fn sampling<const D: usize>(checks: &mut Checks, body: &file::Body, path: &Path) -> Option<Sampling<D>> {
+    let is_random = matches!(body.sampling, Some(file::Sampling::Jittered | file::Sampling::Poisson));
+    if body.seed.is_some() && !is_random {
+        let message =
+            "found a seed without random places; expected sampling = \"poisson\" or \"jittered\" beside it";
+        checks.fault(&path.key("seed"), message.into());
+        return None;
+    }
+    let seed = u64::from(body.seed.unwrap_or(0));
     match body.sampling {
         None | Some(file::Sampling::Lattice) => Some(Sampling::Lattice),
         Some(file::Sampling::Fitted) => Some(Sampling::Fitted),
-        Some(file::Sampling::Jittered) => Some(Sampling::Jittered),
+        Some(file::Sampling::Jittered) => Some(Sampling::Jittered(seed)),
         Some(file::Sampling::Poisson) => {
             let along_leaf = f64::from(CELLS_PER_LEAF) * body.particles_per_cell;
             if along_leaf.fract() != 0.0 {
@@ -573,7 +581,7 @@ fn sampling<const D: usize>(checks: &mut Checks, body: &file::Body, path: &Path)
                 checks.fault(&path.key("particles_per_cell"), message);
                 return None;
             }
-            Some(Sampling::poisson(along_leaf as usize))
+            Some(Sampling::poisson(along_leaf as usize, seed))
         }
     }
 }

@@ -75,6 +75,7 @@ fn source<const D: usize>(
         shape: written.shape.clone(),
         particles_per_cell: written.particles_per_cell,
         sampling: None,
+        seed: None,
         velocity: None,
         angular_velocity: None,
         stage: None,

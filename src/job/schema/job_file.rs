@@ -341,6 +341,11 @@ pub struct Body {
     /// How particles lie: on the lattice by default.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sampling: Option<Sampling>,
+    /// Number that chooses one of many arrangements of `jittered` and `poisson`; 0 by default. Runs that differ in it alone show by how
+    /// much a result depends on where particles lie.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(range(max = 1_000_000_000))]
+    pub seed: Option<u32>,
     /// Components of the velocity, m/s, as many as the job has dimensions; each a number or an expression in x, y, z. At rest by
     /// default.
     #[serde(default)]
