@@ -12,8 +12,8 @@ use nalgebra::{Matrix3, Vector2, Vector3};
 const HALF: f64 = 0.25;
 /// Positions of the bodies.
 const TRIALS: usize = 400;
-/// Cells around the node in which bodies have particles: more than the hat of a node reaches.
-const REACH: f64 = 2.0;
+/// Cells around the node in which bodies have particles: more than the hats of its neighbours reach.
+const REACH: f64 = 3.0;
 /// Weight of the square of the coefficients beside the squares of the misfits in the regression.
 const PENALTY: f64 = 1e-5;
 
@@ -96,10 +96,10 @@ fn weight(x: f64) -> [f64; 2] {
     [value, slope * x.signum()]
 }
 
-/// `Σ V ∇w` and `Σ V w` of a body.
-fn sums(body: &[Point]) -> ([f64; 2], f64) {
+/// `Σ V ∇w` and `Σ V w` of a body at a node.
+fn sums(body: &[Point], node: Point) -> ([f64; 2], f64) {
     let volume = 4.0 * HALF * HALF;
-    body.iter().fold(([0.0; 2], 0.0), |([gx, gy], sum), x| {
+    body.iter().map(|x| x - node).fold(([0.0; 2], 0.0), |([gx, gy], sum), x| {
         let ([wx, dx], [wy, dy]) = (weight(x.x), weight(x.y));
         ([gx + volume * dx * wy, gy + volume * wx * dy], sum + volume * wx * wy)
     })
@@ -107,7 +107,18 @@ fn sums(body: &[Point]) -> ([f64; 2], f64) {
 
 /// Normal and gap from shares of volume, by the solver.
 fn from_shares([first, second]: &[Vec<Point>; 2]) -> Found {
-    let meeting = Meeting::<2>::new([sums(first), sums(second)], 1.0, 1.0, 0)?;
+    let mut smoothed = [0.0; 2];
+    for (i, j) in (-1..=1).flat_map(|i| (-1..=1).map(move |j| (i, j))) {
+        let at = |body| sums(body, Point::new(f64::from(i), f64::from(j)));
+        let ((a, of_first), (b, of_second)) = (at(first), at(second));
+        if of_first > 0.0 && of_second > 0.0 {
+            let share = 0.25_f64.powi(i.abs() + j.abs());
+            let share = share * 0.5_f64.powi(2 - i.abs() - j.abs());
+            (0..2).for_each(|k| smoothed[k] += share * (a[k] - b[k]));
+        }
+    }
+    let of = |body| sums(body, Point::zeros());
+    let meeting = Meeting::<2>::new([of(first), of(second)], smoothed, 1.0, 1.0, 0)?;
     Some((Point::from(meeting.normal), meeting.gap))
 }
 

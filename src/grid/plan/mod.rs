@@ -245,6 +245,12 @@ impl<const D: usize> GridPlan<D> {
         coord.map(|c| f64::from(c) * cell)
     }
 
+    /// Faces of the domain that a needed real node is on, as in [`GridPlan::face_nodes`].
+    pub fn faces_at(&self, node: usize) -> u8 {
+        let place = self.face_nodes.binary_search_by_key(&(node as u32), |(node, _)| *node);
+        place.map_or(0, |place| self.face_nodes[place].1)
+    }
+
     /// Heap bytes held by the larger tables.
     pub fn heap_bytes(&self) -> usize {
         self.tree.heap_bytes()

@@ -64,6 +64,24 @@ impl<const D: usize> NodeFields<D> {
         }
     }
 
+    /// Not collective. Gives the real nodes that occupied bins reach these rows, by number of the node, and
+    /// the constrained ones what they have of their parents.
+    pub fn spread(&mut self, plan: &GridPlan<D>, arenas: &Arenas<D>, row: impl Fn(usize) -> Row + Sync) {
+        self.mark_needed(plan, arenas);
+        let nodes = block_nodes(D);
+        let blocks = self.rows.par_chunks_mut(nodes).zip(&mut self.dirty).zip(&self.needed).enumerate();
+        blocks.with_min_len(64).for_each(|(index, ((rows, dirty), needed))| {
+            if *needed || *dirty {
+                rows.fill(Row::default());
+                *dirty = *needed;
+            }
+            for bit in bits(if *needed { plan.blocks[index].real_nodes() } else { 0 }) {
+                rows[bit as usize] = row(index * nodes + bit as usize);
+            }
+        });
+        self.prolong(plan, arenas);
+    }
+
     /// Not collective. Gives the constrained nodes that the gather reads the values `Σ c f_i` of their
     /// parents, once [`NodeFields::prolong`] has found them. One value for each node.
     pub fn prolong_values(&self, plan: &GridPlan<D>, values: &mut [f64]) {

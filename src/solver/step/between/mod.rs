@@ -8,9 +8,11 @@
 //! | file | what it holds |
 //! |---|---|
 //! | `geometry` | the nodes where bodies meet, and the volumes of their basis functions |
+//! | `normals` | normals between bodies, smoothed over cells |
 //! | `press` | impulses at these nodes |
 //! | `pressure` | the pressure there, as particles carry it |
 mod geometry;
+mod normals;
 mod press;
 mod pressure;
 
@@ -48,10 +50,11 @@ impl<const D: usize> Solver<D> {
         if meets.is_empty() {
             return;
         }
-        if self.has_surfaces_between() {
+        let smoothed = self.has_surfaces_between().then(|| {
             self.find_hats();
-        }
-        let forces = self.press(meets, lengths);
+            self.smooth_gradients(meets)
+        });
+        let forces = self.press(meets, smoothed.as_ref(), lengths);
         if found {
             self.carry_pressures(&forces);
         }

@@ -1,6 +1,7 @@
 //! Impulses of contact at the nodes where bodies meet.
 use rayon::prelude::*;
 
+use super::normals::Smoothed;
 use crate::boundary::BodyContacts;
 use crate::boundary::bodies::{Meeting, Pair, PairLaw};
 use crate::grid::mask::{bits, block_nodes};
@@ -73,12 +74,19 @@ impl<const D: usize> Solver<D> {
     /// Not collective. Applies the impulses of contact at the real nodes where fields meet, given block by
     /// block, and sums impulse and work over the nodes that this rank counts. Returns the normal forces at
     /// these nodes if particles carry their pressure.
-    pub(super) fn press(&mut self, meets: &[u64], lengths: Lengths) -> Vec<NormalForce> {
+    pub(super) fn press(
+        &mut self,
+        meets: &[u64],
+        smoothed: Option<&Smoothed<D>>,
+        lengths: Lengths,
+    ) -> Vec<NormalForce> {
         let grid = &self.grid;
         let press = Press {
             plan: &grid.plan,
             fields: grid.all_fields().collect(),
             solids: &grid.solids,
+            meets,
+            smoothed,
             hats: &grid.hats,
             contacts: &self.physics.body_contacts,
             coordinates: self.physics.coordinates,
@@ -116,6 +124,10 @@ struct Press<'a, const D: usize> {
     fields: Vec<&'a NodeFields<D>>,
     /// Volumes of each field and their gradients, where the law asks for them.
     solids: &'a [Solids<D>],
+    /// Nodes where bodies meet, by block.
+    meets: &'a [u64],
+    /// Smoothed gradients there.
+    smoothed: Option<&'a Smoothed<D>>,
     /// Volumes of the basis functions of real nodes, m³ (in plane strain m²).
     hats: &'a [f64],
     contacts: &'a BodyContacts,
@@ -220,9 +232,10 @@ impl<const D: usize> Press<'_, D> {
             let row = self.solids[body.field].field.fields.rows[node].0;
             (std::array::from_fn(|a| row[a]), row[3])
         });
-        let on = plan.face_nodes.binary_search_by_key(&(node as u32), |(node, _)| *node);
-        let on_faces = on.map_or(0, |place| plan.face_nodes[place].1);
-        let meeting = Meeting::new(sums, self.hats[node], cell, on_faces)?;
+        let (block, bit) = (node / block_nodes(D), (node % block_nodes(D)) as u32);
+        let fields = bodies.map(|body| body.field);
+        let smooth = self.smoothed?.between(block, bit, self.meets[block], fields);
+        let meeting = Meeting::new(sums, smooth, self.hats[node], cell, plan.faces_at(node))?;
         let impulse = law.impulse(&relative, masses, &meeting, cell, self.lengths);
         let along = (0..D).fold(0.0, |sum, a| impulse[a].mul_add(meeting.normal[a], sum));
         Some(Exchange { impulse, pressed: [along / self.lengths.kick, meeting.area] })
