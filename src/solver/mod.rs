@@ -49,6 +49,10 @@ use crate::solver::state::regrid_cache::RegridCache;
 use crate::solver::state::regrid_timers::RegridTimers;
 use crate::solver::state::relaxation::{RelaxPhase, Relaxation};
 
+/// Length of the step before, over the bound on the next, of which half counts as lag at most. Bounds that vary
+/// with the motion stay well below it, and so do those of trees that are refined by a level.
+const MOST_BEFORE: f64 = 2.1;
+
 impl<const D: usize> Solver<D> {
     /// Collective. A solver for particles that lie in their leaves (`chunks[i]` in leaf `i`). For a state
     /// read from a file `clock` is that of the file; for a new run it is the default.
@@ -145,7 +149,7 @@ impl<const D: usize> Solver<D> {
         self.comm.begin_step(self.clock.step);
         self.leaf_data.begin_step(self.clock.step, self.chunks.len());
         self.weigh_particles();
-        let lengths = Lengths::new(self.lag(), dt);
+        let lengths = Lengths::new(self.caught_up_lag(), dt);
         let advanced = self.advance(to, lengths);
         (self.clock.step, self.clock.time, self.clock.dt) = (self.clock.step + 1, to, dt);
         let settled = self.relax(lengths);
@@ -186,6 +190,17 @@ impl<const D: usize> Solver<D> {
             RelaxPhase::Stopped => 0.0,
             _ => 0.5 * self.clock.dt,
         }
+    }
+
+    /// Not collective. The lag ahead of a step. After a sudden fall of the bound on the step, as where a shock
+    /// begins, forces act over no more than the material bears: the rest of the lag is left out.
+    fn caught_up_lag(&mut self) -> f64 {
+        let (lag, most) = (self.lag(), 0.5 * MOST_BEFORE * self.clock.bound);
+        if lag <= most {
+            return lag;
+        }
+        self.skip_forces(lag - most);
+        most
     }
 
     /// The time to which velocities belong, and up to which forces have acted, s.
