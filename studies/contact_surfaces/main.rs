@@ -108,7 +108,7 @@ fn sums(body: &[Point], node: Point) -> ([f64; 2], f64) {
 /// Normal and gap from shares of volume, by the solver.
 fn from_shares([first, second]: &[Vec<Point>; 2]) -> Found {
     let mut smoothed = [0.0; 2];
-    for (i, j) in (-1..=1).flat_map(|i| (-1..=1).map(move |j| (i, j))) {
+    for (i, j) in (-1_i32..=1).flat_map(|i| (-1_i32..=1).map(move |j| (i, j))) {
         let at = |body| sums(body, Point::new(f64::from(i), f64::from(j)));
         let ((a, of_first), (b, of_second)) = (at(first), at(second));
         if of_first > 0.0 && of_second > 0.0 {
