@@ -5,7 +5,7 @@
 use std::fmt::Write as _;
 use std::process::ExitCode;
 
-use agimp::boundary::bodies::Meeting;
+use agimp::boundary::bodies::{Meeting, gap_between, part_in_normals};
 use nalgebra::{Matrix3, Vector2, Vector3};
 
 /// Half width of particles, in cells.
@@ -108,12 +108,12 @@ fn sums(body: &[Point], node: Point) -> ([f64; 2], f64) {
 /// Normal and gap from shares of volume, by the solver.
 fn from_shares([first, second]: &[Vec<Point>; 2]) -> Found {
     let mut smoothed = [0.0; 2];
-    for (i, j) in (-1_i32..=1).flat_map(|i| (-1_i32..=1).map(move |j| (i, j))) {
+    for (i, j) in (-1..=1_i32).flat_map(|i| (-1..=1_i32).map(move |j| (i, j))) {
         let at = |body| sums(body, Point::new(f64::from(i), f64::from(j)));
         let ((a, of_first), (b, of_second)) = (at(first), at(second));
         if of_first > 0.0 && of_second > 0.0 {
-            let share = 0.25_f64.powi(i.abs() + j.abs());
-            let share = share * 0.5_f64.powi(2 - i.abs() - j.abs());
+            let share = 0.25 * 0.5_f64.powi(i.abs() + j.abs());
+            let share = share * part_in_normals(gap_between([of_first, of_second]));
             (0..2).for_each(|k| smoothed[k] += share * (a[k] - b[k]));
         }
     }
