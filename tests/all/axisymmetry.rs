@@ -264,7 +264,7 @@ fn a_tube_and_a_piston_act_on_the_whole_circumference() {
 
     let moves = "[[bodies]]\nname = 'block'\nmaterial = 'rubber'\nvelocity = [0, 1]\n\
         shape = { kind = 'box', min = [0, 0.125], max = [0.25, 0.375] }\n\
-        [time]\nend = 0.01\n[history]\nevery_steps = 1\n";
+        [time]\nend = 5e-3\n[history]\nevery_steps = 1\n";
     let cohesive = tube("kind = 'separating', cohesion = 1000");
     let history = self::history("stuck", &job([0.5, 0.5], &(cohesive + moves)));
     let force = history.last("force_tube_y") / (1000.0 * TAU * radius * 0.25);
