@@ -159,7 +159,7 @@ impl<const D: usize> Tile<D> {
     }
 }
 
-/// What a seed changes in the numbers that are mixed: nothing if it is 0, the default.
+/// Change that a seed makes to the numbers that are mixed: none if it is 0, the default.
 fn start_of(seed: u64) -> u64 {
     if seed == 0 { 0 } else { mixed(seed) }
 }

@@ -272,7 +272,8 @@ fn a_tube_and_a_piston_act_on_the_whole_circumference() {
     assert!((force - 1.0).abs() < 2e-3);
 }
 
-/// Sand that falls round a punch at nodes and a ring at particles, with F-bar, on two levels: the same bits on any ranks and across a restart.
+/// Sand that falls round a punch at nodes and a ring at particles, with F-bar, on two levels: the same bits on
+/// any ranks and across a restart.
 #[test]
 fn results_are_the_same_on_any_ranks_and_across_a_restart() {
     let text = "version = 1\ndimension = 2\ngeometry = 'axisymmetric'\ngravity = [0, -9.81]\n\

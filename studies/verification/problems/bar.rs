@@ -63,7 +63,8 @@ fn run(runs: &Runs, name: &str, cells: f64, more: &[String]) -> Found {
     Found { energy: [worst, (energy(&rows[rows.len() - 1]) / start - 1.0).abs()], velocity, frequency, curve }
 }
 
-/// Order of the error in time: the bar from rest under a force that acts at once, with steps of 1, 1/2 and 1/4 of the longest against 1/16 of it.
+/// Order of the error in time: the bar from rest under a force that acts at once, with steps of 1, 1/2 and 1/4
+/// of the longest against 1/16 of it.
 pub(crate) fn in_time(runs: &Runs, page: &mut Page) {
     // Powers of 2, so that all steps end at the same times.
     const LONGEST: f64 = 1.0 / 32.0;
