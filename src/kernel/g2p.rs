@@ -323,18 +323,17 @@ impl Advance<'_> {
             (Transfer::Apic, Some(wall)) => wall.kept_affine_velocity(&moved),
             _ => None,
         };
-        for k in 0..D {
-            let affine = V::columns(&sums.affine[k]);
-            for i in 0..D {
-                let value = match scheme.transfer {
-                    Transfer::Apic => match kept {
-                        Some(kept) => affine[i] * kept[k],
-                        None => affine[i],
-                    },
-                    Transfer::Tpic => gradient[i][k],
-                    Transfer::Flip { .. } | Transfer::Xpic { .. } => zero,
-                };
-                batch.store(tile, Layout::<D>::AFFINE + D * i + k, value);
+        if scheme.transfer.has_affine() {
+            for k in 0..D {
+                let affine = V::columns(&sums.affine[k]);
+                for i in 0..D {
+                    let value = match (scheme.transfer, kept) {
+                        (Transfer::Tpic, _) => gradient[i][k],
+                        (_, Some(kept)) => affine[i] * kept[k],
+                        (_, None) => affine[i],
+                    };
+                    batch.store(tile, Layout::<D>::AFFINE + D * i + k, value);
+                }
             }
         }
         let plastic = domain::plastic_lanes(|| index, scheme) != 0;

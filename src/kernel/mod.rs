@@ -120,6 +120,11 @@ impl Transfer {
     pub fn has_increments(self) -> bool {
         matches!(self, Self::Flip { .. } | Self::Xpic { .. })
     }
+
+    /// Whether particles carry an affine matrix. Elsewhere its columns stay 0, and no kernel touches them.
+    pub fn has_affine(self) -> bool {
+        !self.has_increments()
+    }
 }
 
 /// Coordinates of the domain.
@@ -152,11 +157,11 @@ impl Coordinates {
     }
 
     /// Distance (m) along the first axis from the centre of a box with this half width (m) at `x` to its
-    /// centre of mass: `∫ r² dr / ∫ r dr - x`.
+    /// centre of mass: `∫ r² dr / ∫ r dr - x`. A box that reaches beyond the axis counts as one that touches it.
     pub fn to_mass_centre(self, half: f64, x: f64) -> f64 {
         match self {
             Self::Cartesian => 0.0,
-            Self::Axisymmetric => half * half / (3.0 * x),
+            Self::Axisymmetric => half * half / (3.0 * x.max(half)),
         }
     }
 }

@@ -213,7 +213,10 @@ impl<const D: usize> Prepared<D> {
         for k in 0..D {
             let factor = if transfer == Transfer::Apic { mass / V::load(&spread[k]) } else { mass };
             for i in 0..D {
-                column[i] = batch.load::<V>(tile, Layout::<D>::AFFINE + D * i + k) * factor;
+                column[i] = match transfer.has_affine() {
+                    true => batch.load::<V>(tile, Layout::<D>::AFFINE + D * i + k) * factor,
+                    false => zero,
+                };
             }
             V::write_rows(column, &mut self.affine[k]);
         }

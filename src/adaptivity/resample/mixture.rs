@@ -268,7 +268,7 @@ fn mix_motion<const D: usize>(
         let affine = read_matrix(chunk, p);
         let r: [f64; D] = std::array::from_fn(|a| from[a] - centre[a]);
         let u: [f64; D] = std::array::from_fn(|a| velocity[a] - v[a]);
-        let to_centre = setting.scheme.coordinates.to_mass_centre(half[i][0], position[0].max(half[i][0]));
+        let to_centre = setting.scheme.coordinates.to_mass_centre(half[i][0], position[0]);
         for a in 0..D {
             for b in 0..D {
                 // Of a box, about the centre of mass.

@@ -80,8 +80,7 @@ impl<const D: usize> Setting<'_, D> {
         let (cell, mut half) = (self.cell(), Vec::new());
         domain::full_half_widths(chunk, Select::List(which), cell, &self.extent, self.scheme, &mut half);
         let radius = |p: u32| chunk.position(p as usize)[0];
-        let to_centre =
-            |half: &[f64; D], x: f64| self.scheme.coordinates.to_mass_centre(half[0], x.max(half[0]));
+        let to_centre = |half: &[f64; D], x: f64| self.scheme.coordinates.to_mass_centre(half[0], x);
         half.iter().zip(which).map(|(half, &p)| to_centre(half, radius(p))).collect()
     }
 

@@ -96,7 +96,7 @@ impl<const D: usize> Solver<D> {
                         if let Some(contact) =
                             Touching::new(number, collider, (&state.pose, rate), &x, of_box, lengths, reach)
                         {
-                            let to_mass = scheme.coordinates.to_mass_centre(half[0], x[0].max(half[0]));
+                            let to_mass = scheme.coordinates.to_mass_centre(half[0], x[0]);
                             let around = scheme.coordinates.around(x[0] + contact.arm[0]);
                             let contact = contact.around(around, to_mass);
                             found.push(chunk, p as usize, contact);

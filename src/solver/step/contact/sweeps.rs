@@ -74,7 +74,11 @@ impl<const D: usize> Solver<D> {
         touching: &[Vec<Touching<D>>],
         impulse: impl Fn(usize, usize) -> [f64; D],
     ) {
-        let scheme = self.physics.scheme();
+        let mut scheme = self.physics.scheme();
+        if !scheme.transfer.has_affine() {
+            // The impulses have an affine part whatever the particles carry.
+            scheme.transfer = Transfer::Tpic;
+        }
         for (leaf, chunk) in chunks.iter_mut().enumerate() {
             for p in 0..chunk.len() {
                 let (j, arm) = (impulse(leaf, p), &touching[leaf][p].lever);
