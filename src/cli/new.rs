@@ -35,7 +35,7 @@ macro_rules! templates {
 const TEMPLATES: &[Template] = templates![
     "column_collapse_2d";
     "column_collapse_mohr_coulomb";
-    "column_collapse" quick "tree.base_level=0", "tree.regions.0.level=1", "tree.regions.1.level=2", "tree.regions.2.level=2";
+    "column_collapse";
     "column_collapse_tall" quick "tree.base_level=0", "adaptivity.criteria.0.level=1", "adaptivity.criteria.1.level=2";
     "silo";
     "hopper" with "meshes/hopper.obj", "meshes/glass.obj" quick "time.end=0.2";

@@ -306,7 +306,7 @@ fn plot(page: &Path, counts: &[(&str, Count)], fits: &Fits) -> Result<(), Failur
 
 /// Surface of partitions of the tree of a column collapse along both curves.
 fn curves() -> Result<String, Failure> {
-    let path = Path::new("jobs/column_collapse.toml");
+    let path = Path::new("studies/scaling/static_tree.toml");
     let AnyProblem::Three(problem) = job::load(path).map_err(|error| error.to_string())? else {
         return Err(format!("{} is not in space", path.display()));
     };
