@@ -2,7 +2,8 @@
 //!
 //! Each run is a process of its own (`agimp run`, by default alone, or started by a launcher such as
 //! `mpirun -n 4`) with a directory of its own. A run that has its report is finished and not done again, so
-//! that the same command goes on after an interruption. Results of another job are replaced only on request.
+//! that the same command goes on after an interruption, and other values join those that are there. Results of
+//! another job are replaced only on request.
 //!
 //! | file | content |
 //! |---|---|
@@ -12,6 +13,7 @@
 mod process;
 mod table;
 
+use std::cmp::Ordering;
 use std::fmt::Write as _;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
@@ -19,6 +21,7 @@ use std::path::{Path, PathBuf};
 use self::process::Ended;
 use super::Failure;
 use super::shared::message::warn_of;
+use crate::checksum::fnv1a;
 use crate::job::{self, Settings};
 use crate::run::at_end::report::{self, Report};
 use crate::run::claim;
@@ -41,6 +44,9 @@ pub struct Arguments {
     /// A value for all runs, as for `agimp run`; may be given several times.
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
+    /// Columns of the history to print for each run, by the beginning of their names; all are in sweep.csv.
+    #[arg(long, value_name = "COLUMNS", value_delimiter = ',')]
+    show: Vec<String>,
     /// Directory of the sweep: one directory for each run, and `sweep.csv`; out/NAME.sweep by default.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
@@ -68,6 +74,14 @@ struct Run {
     end: f64,
 }
 
+/// One row of the table.
+struct Row<'a> {
+    run: &'a Run,
+    status: &'static str,
+    /// Of a run that has finished.
+    report: Option<Report>,
+}
+
 /// Runs the combinations that are not finished yet, and writes the table.
 ///
 /// # Errors
@@ -77,7 +91,8 @@ pub(super) fn execute(arguments: &Arguments) -> Result<(), Failure> {
     let stop = StopRequest::listen()?;
     let over: Vec<(String, Vec<String>)> =
         arguments.over.iter().map(|text| key_and_values(text)).collect::<Result<_, _>>()?;
-    let runs = runs(arguments, &over)?;
+    let bytes = job::read(&arguments.job)?;
+    let runs = runs(arguments, &bytes, &over)?;
     let (name, root) = (name(arguments), root(arguments));
     let cannot = |error| Failure::Run(format!("{}: cannot create the directory: {error}", root.display()));
     std::fs::create_dir_all(&root).map_err(cannot)?;
@@ -88,8 +103,21 @@ pub(super) fn execute(arguments: &Arguments) -> Result<(), Failure> {
     if !arguments.overwrite {
         process::spare_results(&runs, &name)?;
     }
-    let (mut failed, mut rows) = (0, Vec::new());
-    let table = root.join("sweep.csv");
+    let (mut failed, table) = (0, root.join("sweep.csv"));
+    let earlier = earlier(arguments, &bytes, &over, &runs, &table)?;
+    let report_of = |run: &Run| finished(&report::path(&run.directory, &name), run);
+    let mut rows: Vec<Row> = earlier
+        .iter()
+        .filter_map(|run| Some(Row { run, status: "finished", report: Some(report_of(run)?) }))
+        .collect();
+    if rows.len() < earlier.len() {
+        warn_of(&[format!(
+            "{}: {} of {} earlier rows are those of another job, and leave the table; their directories stay",
+            table.display(),
+            earlier.len() - rows.len(),
+            earlier.len()
+        )]);
+    }
     for (number, run) in runs.iter().enumerate() {
         let what = run.settings[arguments.set.len()..].join(", ");
         let place = format!("run {} of {}, {what}", number + 1, runs.len());
@@ -117,10 +145,16 @@ pub(super) fn execute(arguments: &Arguments) -> Result<(), Failure> {
                 }
             }
         }
-        rows.push((run, status, finished(&report, run)));
+        rows.push(Row { run, status, report: finished(&report, run) });
+        rows.sort_by(|a, b| {
+            order(&a.run.values).partial_cmp(&order(&b.run.values)).unwrap_or(Ordering::Equal)
+        });
         table::write(&table, &over, &rows)?;
     }
-    writeln!(std::io::stdout(), "{} ({} runs)", table.display(), runs.len())?;
+    if !arguments.show.is_empty() {
+        write!(std::io::stdout(), "{}", table::shown(&over, &rows, &arguments.show)?)?;
+    }
+    writeln!(std::io::stdout(), "{} ({} runs)", table.display(), rows.len())?;
     match failed {
         0 => Ok(()),
         _ => Err(Failure::Run(format!("{failed} of {} runs failed", runs.len()))),
@@ -164,12 +198,11 @@ fn root(arguments: &Arguments) -> PathBuf {
 }
 
 /// All combinations, the last key changing fastest, each checked as a job.
-fn runs(arguments: &Arguments, over: &[(String, Vec<String>)]) -> Result<Vec<Run>, Failure> {
+fn runs(arguments: &Arguments, bytes: &[u8], over: &[(String, Vec<String>)]) -> Result<Vec<Run>, Failure> {
     let count = over.iter().try_fold(1_usize, |count, (_, values)| count.checked_mul(values.len()));
     let count = count.filter(|count| *count <= MOST_RUNS).ok_or_else(|| {
         Failure::Usage(format!("found more than {MOST_RUNS} combinations; expected fewer values of --over"))
     })?;
-    let bytes = job::read(&arguments.job)?;
     (0..count)
         .map(|number| {
             let mut rest = number;
@@ -183,31 +216,65 @@ fn runs(arguments: &Arguments, over: &[(String, Vec<String>)]) -> Result<Vec<Run
                 })
                 .collect();
             values.reverse();
-            let mut settings = arguments.set.clone();
-            settings.extend(over.iter().zip(&values).map(|((key, _), value)| format!("{key}={value}")));
-            let mut checked = Settings::default();
-            for setting in &settings {
-                checked.set(setting).map_err(Failure::Usage)?;
-            }
-            let problem = job::from_bytes(bytes.clone(), &arguments.job, &checked)?;
-            let directory = root(arguments).join(directory(number + 1, over, &values));
-            Ok(Run { values, settings, directory, digest: problem.digest(), end: problem.end() })
+            run(arguments, bytes, over, values)
         })
         .collect()
 }
 
-/// Name of the directory of a run: its number, and its settings as far as a name can have them.
-fn directory(number: usize, over: &[(String, Vec<String>)], values: &[String]) -> String {
-    let mut name = format!("{number:04}");
-    for ((key, _), value) in over.iter().zip(values) {
-        let key = key.rsplit('.').next().unwrap_or_default();
-        let _ = write!(name, "_{key}={value}");
+/// The run with these values, checked as a job.
+fn run(
+    arguments: &Arguments,
+    bytes: &[u8],
+    over: &[(String, Vec<String>)],
+    values: Vec<String>,
+) -> Result<Run, Failure> {
+    let mut settings = arguments.set.clone();
+    settings.extend(over.iter().zip(&values).map(|((key, _), value)| format!("{key}={value}")));
+    let mut checked = Settings::default();
+    for setting in &settings {
+        checked.set(setting).map_err(Failure::Usage)?;
     }
-    let name: String = name
-        .chars()
-        .map(|c| if c.is_alphanumeric() || "_=-+.".contains(c) { c } else { '_' })
-        .take(NAME)
-        .collect();
+    let problem = job::from_bytes(bytes.to_vec(), &arguments.job, &checked)?;
+    let directory = root(arguments).join(directory(over, &values));
+    Ok(Run { values, settings, directory, digest: problem.digest(), end: problem.end() })
+}
+
+/// Runs of an earlier sweep over the same keys, with other values than these.
+fn earlier(
+    arguments: &Arguments,
+    bytes: &[u8],
+    over: &[(String, Vec<String>)],
+    runs: &[Run],
+    table: &Path,
+) -> Result<Vec<Run>, Failure> {
+    let rows = table::values(table, over)?;
+    let others = rows.into_iter().filter(|values| runs.iter().all(|run| run.values != *values));
+    Ok(others.filter_map(|values| run(arguments, bytes, over, values).ok()).collect())
+}
+
+/// What rows are sorted by: numbers by size, before all other values.
+fn order(values: &[String]) -> Vec<(bool, f64, &str)> {
+    let number =
+        |value: &String| value.replace('_', "").parse::<f64>().ok().filter(|number| number.is_finite());
+    values
+        .iter()
+        .map(|value| number(value).map_or((true, 0.0, value.as_str()), |number| (false, number, "")))
+        .collect()
+}
+
+/// Name of the directory of a run: its settings. Where a name cannot have them, their checksum keeps it apart.
+fn directory(over: &[(String, Vec<String>)], values: &[String]) -> String {
+    let mut whole = String::new();
+    for ((key, _), value) in over.iter().zip(values) {
+        let (key, before) =
+            (key.rsplit('.').next().unwrap_or_default(), if whole.is_empty() { "" } else { "_" });
+        let _ = write!(whole, "{before}{key}={value}");
+    }
+    let plain = |c: char| if c.is_alphanumeric() || "_=-+.".contains(c) { c } else { '_' };
+    let mut name: String = whole.chars().map(plain).take(NAME).collect();
+    if name != whole {
+        let _ = write!(name, "-{:06x}", fnv1a(whole.bytes().map(u64::from)) & 0xff_ffff);
+    }
     name
 }
 
@@ -238,7 +305,20 @@ mod tests {
             ("materials.sand.friction_angle".to_owned(), vec![]),
             ("bodies.0.velocity".to_owned(), vec![]),
         ];
-        let name = directory(7, &over, &["30".into(), "[1, 0]".into()]);
-        assert_eq!(name, "0007_friction_angle=30_velocity=_1__0_");
+        assert_eq!(directory(&over[..1], &["30".into()]), "friction_angle=30");
+        let name = |x: &str| directory(&over, &["30".into(), format!("[{x}, 0]")]);
+        assert!(name("1").starts_with("friction_angle=30_velocity=_1__0_-"), "{}", name("1"));
+        assert_ne!(
+            name("1"),
+            directory(&over, &["30".into(), "[1; 0]".into()]),
+            "apart where letters are not"
+        );
+    }
+
+    #[test]
+    fn rows_are_sorted_by_numbers_and_others_follow() {
+        let mut rows = ["1e3", "\"b\"", "20", "-3", "\"a\"", "1_000_000"].map(|value| vec![value.to_owned()]);
+        rows.sort_by(|a, b| order(a).partial_cmp(&order(b)).unwrap_or(Ordering::Equal));
+        assert_eq!(rows.map(|row| row.concat()), ["-3", "20", "1e3", "1_000_000", "\"a\"", "\"b\""]);
     }
 }
