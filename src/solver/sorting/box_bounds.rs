@@ -1,7 +1,7 @@
 //! Bounds on the widths of boxes, for sorting.
 use super::bins::BoxWidths;
 use crate::grid::GridPlan;
-use crate::kernel::{BoxPolicy, Coordinates, Scheme, domain};
+use crate::kernel::{BoxPolicy, Coordinates, Scheme, Select, domain};
 use crate::particle::Chunk;
 use crate::particle::chunk::{Layout, Tag};
 use crate::particle::halvings;
@@ -30,6 +30,13 @@ impl<const D: usize> Widths<'_, D> {
             (BoxPolicy::Volume { .. }, Coordinates::Axisymmetric) => BoxPolicy::Cell,
             (policy, _) => policy,
         }
+    }
+
+    /// Half widths (m) of the boxes of all particles of a leaf with cells of this edge, m.
+    pub(in crate::solver) fn of_leaf(&self, chunk: &Chunk<D>, cell: f64) -> Vec<[f64; D]> {
+        let mut half = Vec::with_capacity(chunk.len());
+        domain::full_half_widths(chunk, Select::All, cell, &self.extent, &self.scheme, &mut half);
+        half
     }
 
     /// The greatest half width among boxes that may become wider than `cell`, m; 0 if none may.

@@ -52,12 +52,7 @@ fn surface_at<const D: usize>(
 }
 
 /// Half widths of the box of a particle in a leaf with cells of this edge, m.
-pub(super) fn half_widths<const D: usize>(
-    widths: &Widths<'_, D>,
-    chunk: &Chunk<D>,
-    p: usize,
-    cell: f64,
-) -> [f64; D] {
+fn half_widths<const D: usize>(widths: &Widths<'_, D>, chunk: &Chunk<D>, p: usize, cell: f64) -> [f64; D] {
     widths.of_batch(chunk, &[p as u32], cell).map(|half| half.to_array()[0])
 }
 
@@ -94,11 +89,13 @@ impl<const D: usize> Pushing<'_, D> {
         pushes: &mut Vec<ParticlePush<D>>,
     ) -> Velocities<D> {
         let mut before = Vec::new();
+        let has_water = self.loads.iter().any(|(_, load)| matches!(load.kind, Kind::Water(_)));
+        let boxes = if has_water { self.widths.of_leaf(chunk, cell) } else { Vec::new() };
         for p in 0..chunk.len() {
             let from = pushes.len();
             let mass = chunk.column(Layout::<D>::MASS)[p];
             for &(number, load) in &self.loads {
-                if let Some(force) = self.force(chunk, p, load, cell, mass / scale) {
+                if let Some(force) = self.force(chunk, p, load, (cell, boxes.get(p)), mass / scale) {
                     let way = chunk.position(p);
                     pushes.push(ParticlePush { particle: p as u32, load: number as u32, force, way });
                 }
@@ -117,8 +114,16 @@ impl<const D: usize> Pushing<'_, D> {
         before
     }
 
-    /// Force of a load on a particle of this mass (kg), N, if it has any.
-    fn force(&self, chunk: &Chunk<D>, p: usize, load: &Load<D>, cell: f64, mass: f64) -> Option<[f64; D]> {
+    /// Force of a load on a particle of this mass (kg) in a leaf with cells of this edge (m), N, if it has any.
+    /// Water needs the half widths of its box, m.
+    fn force(
+        &self,
+        chunk: &Chunk<D>,
+        p: usize,
+        load: &Load<D>,
+        (cell, half): (f64, Option<&[f64; D]>),
+        mass: f64,
+    ) -> Option<[f64; D]> {
         let place = |x: &[f64; D]| load.place(x, &displacement(chunk, self.displacement, p));
         match &load.kind {
             Kind::Carried(carried) => {
@@ -127,10 +132,9 @@ impl<const D: usize> Pushing<'_, D> {
                 Some(load.force(carried, &numbers, &place(&x), self.middle - load.start))
             }
             Kind::Water(water) => {
-                let half = half_widths(&self.widths, chunk, p, cell);
                 let at = place(&chunk.position(p)).now;
                 let water = water.about(head(chunk, self.head, p, &load.origin));
-                let per_volume = water.force(at, &half, self.middle - load.start, &self.gravity);
+                let per_volume = water.force(at, half?, self.middle - load.start, &self.gravity);
                 (per_volume != [0.0; D]).then(|| per_volume.map(|force| volume(chunk, p) * force))
             }
             _ => {

@@ -4,7 +4,6 @@
 //! has the velocity of the particle, which stays: what it brings is booked.
 use rayon::prelude::*;
 
-use super::carried::half_widths;
 use crate::exact_sum::ExactSum;
 use crate::grid::GridPlan;
 use crate::load::{Load, Water};
@@ -41,11 +40,16 @@ impl<'a, const D: usize> Table<'a, D> {
         Self { physics, widths, water, head: physics.followed_columns().head, time }
     }
 
-    /// Share of the box of a particle below the table, in a leaf with cells of this edge, m.
-    fn share(&self, chunk: &Chunk<D>, p: usize, cell: f64) -> f64 {
+    /// Half widths (m) of the boxes in a leaf with cells of this edge (m), if there is water.
+    fn boxes(&self, chunk: &Chunk<D>, cell: f64) -> Vec<[f64; D]> {
+        if self.water.is_some() { self.widths.of_leaf(chunk, cell) } else { Vec::new() }
+    }
+
+    /// Share of the box of a particle below the table.
+    fn share(&self, chunk: &Chunk<D>, p: usize, boxes: &[[f64; D]]) -> f64 {
         let Some((load, water)) = self.water else { return 0.0 };
         let about = water.about(head(chunk, self.head, p, &self.physics.origin));
-        let half = half_widths(&self.widths, chunk, p, cell)[water.up.axis];
+        let half = boxes[p][water.up.axis];
         let place = load.place(&chunk.position(p), &[0.0; D]).now;
         about.share_below(place, half, self.time - load.start)
     }
@@ -66,8 +70,8 @@ impl<const D: usize> Solver<D> {
         let table = Table::at(&self.physics, &self.grid.plan, self.clock.time);
         let seeps = self.physics.seepage.is_some();
         let shares = self.chunks.par_iter().zip(known).enumerate().map(|(leaf, (chunk, &known))| {
-            let cell = self.grid.plan.finest_cell(leaf);
-            let share = |p: usize| if seeps { 0.0 } else { table.share(chunk, p, cell) };
+            let boxes = table.boxes(chunk, self.grid.plan.finest_cell(leaf));
+            let share = |p: usize| if seeps { 0.0 } else { table.share(chunk, p, &boxes) };
             (known..chunk.len()).map(share).collect()
         });
         let shares: Vec<Vec<f64>> = shares.collect();
@@ -87,13 +91,16 @@ impl<const D: usize> Solver<D> {
         let table = Table::at(&self.physics, &self.grid.plan, time);
         let (chunks, plan) = (&self.chunks, &self.grid.plan);
         let changes = chunks.par_iter().enumerate().with_min_len(16).map(|(leaf, chunk)| {
-            let cell = plan.finest_cell(leaf);
+            let boxes = table.boxes(chunk, plan.finest_cell(leaf));
             let change = |p: usize| {
+                let saturated = table.saturated(chunk, p);
+                if saturated == 1.0 {
+                    return None;
+                }
                 let was = chunk.carried(column).get(p).copied().unwrap_or(0.0);
-                let (saturated, share) = (table.saturated(chunk, p), table.share(chunk, p, cell));
-                let is_new = saturated != 1.0 && (share - was).abs() > ROUNDING;
+                let share = table.share(chunk, p, &boxes);
                 let density = |share: f64| share.mul_add(saturated - 1.0, 1.0);
-                is_new.then(|| (p, share, density(share) / density(was)))
+                ((share - was).abs() > ROUNDING).then(|| (p, share, density(share) / density(was)))
             };
             (0..chunk.len()).filter_map(change).collect()
         });
