@@ -252,8 +252,10 @@ impl<'s> Checker<'s> {
             }
             // A misspelt key was most likely meant to be one that is missing.
             let keys = layers.properties().filter(|(_, schema)| self.fits(schema)).map(|(known, _)| known);
+            // One that is there already can be meant by a setting of the command line.
             let free = keys.clone().filter(|known| node.get(known).is_none());
-            let meant = nearest(key, missing.iter().copied()).or_else(|| nearest(key, free));
+            let known = free.chain(keys.clone().filter(|known| node.get(known).is_some()));
+            let meant = nearest(key, missing.iter().copied()).or_else(|| nearest(key, known));
             let quoted = excerpt(key, QUOTED);
             let message = match meant {
                 Some(meant) => {

@@ -5,6 +5,7 @@
 //! | `mod.rs` | faces, angles of friction, long runs |
 //! | `colliders.rs` | thin colliders, those that overlap bodies, those outside the domain |
 //! | `damage.rs` | crack bands that are too wide |
+//! | `ground.rs` | unit weights, radians, gravity upwards, water and points where no ground is |
 //! | `shock.rs` | gas without what its shocks need |
 //! | `stretch.rs` | elastic bodies that are stretched further than particles follow |
 //! | `units.rs` | properties that no matter has |
@@ -16,6 +17,7 @@ use crate::text::{count, excerpt, number};
 
 mod colliders;
 mod damage;
+mod ground;
 mod shock;
 mod stretch;
 mod units;
@@ -35,6 +37,7 @@ pub fn warnings<const D: usize>(problem: &Problem<D>, steps: f64) -> Vec<String>
     saturated(problem, &mut all);
     colliders::look(problem, &mut all);
     damage::look(problem, &mut all);
+    ground::look(problem, &mut all);
     shock::look(problem, &mut all);
     stretch::look(problem, &mut all);
     units::look(problem, steps, &mut all);
@@ -185,6 +188,29 @@ colliders = [{ name = "plate", shape = { kind = "box", min = [0, 0.5], max = [1,
             (
                 ("x_max = { kind = \"slip\" }, ", ""),
                 "boundaries: found no condition for x_max; the default applies: ",
+            ),
+            (
+                ("friction_angle = 30", "friction_angle = 0.5"),
+                "materials[0].friction_angle: found 0.5 degrees for \"m\"; expected more: angles are in degrees, and 0.5 rad are 28.6",
+            ),
+            (
+                ("density = 1000", "density = 20"),
+                "materials[0].density: found 20 kg/m³ for \"m\", a material of ground; expected at least 100: 20 kN/m³ are 2040",
+            ),
+            (
+                ("dimension = 2", "dimension = 2\ngravity = [0, 9.81]"),
+                "gravity: found 9.81 m/s² along +y, which pictures show as up; expected a negative number",
+            ),
+            (
+                ("dimension = 2", "dimension = 2\ngravity = [0, -9.81]\nwater = { level = -3 }"),
+                "water: found no body that reaches below the water table",
+            ),
+            (
+                (
+                    "dimension = 2",
+                    "dimension = 2\ntracks = [{ name = \"t\", point = [0.5, 0.9], quantities = [\"centre\"] }]",
+                ),
+                "tracks[0].point: \"t\" lies 400 mm from the nearest body; expected a point in one: the track follows the particle nearest to (0.5, 0.9) m",
             ),
         ];
         for (change, expected) in cases {
