@@ -40,11 +40,8 @@ pub(super) fn pictures(body: &mut String, run: &Run, options: &Options) -> Resul
     let (colour, look) = match &options.colour {
         Some(colour) => (colour.as_str(), survey(colour)?),
         None => {
-            let plastic = survey("plastic_strain").ok().filter(|look| look.range[1] > look.range[0]);
-            match plastic {
-                Some(look) => ("plastic_strain", look),
-                None => ("speed", survey("speed")?),
-            }
+            let colour = picture::usual_colour(&outputs[last], &settings, &scene);
+            (colour, survey(colour)?)
         }
     };
     section(body, "pictures", "Pictures");

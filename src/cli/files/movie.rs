@@ -52,7 +52,8 @@ pub(in crate::cli) fn execute(arguments: &Arguments) -> Result<(), Failure> {
         given_looks.settings(arguments.title.as_deref(), files.first().map(PathBuf::as_path), name)?;
     let scene = given_looks.scene(&files[0]);
     // All frames share range, frame and scale of vectors.
-    let look = survey(&files, &given_looks.colour, &settings, &scene).map_err(failed)?;
+    let colour = given_looks.colour(&files, &settings, &scene);
+    let look = survey(&files, &colour, &settings, &scene).map_err(failed)?;
     settings.share(&look);
 
     let size = [settings.width, settings.height];
@@ -60,7 +61,7 @@ pub(in crate::cli) fn execute(arguments: &Arguments) -> Result<(), Failure> {
     let mut movie = Movie::begin(&out, format, size, files.len(), arguments.fps).map_err(cannot)?;
     // HDF5 is read by this thread alone; as many frames are drawn at once as there are threads.
     for some in files.chunks(rayon::current_num_threads().max(1)) {
-        let read = some.iter().map(|file| Prepared::read(file, &given_looks.colour, &settings, &scene));
+        let read = some.iter().map(|file| Prepared::read(file, &colour, &settings, &scene));
         let read = read.collect::<Result<Vec<_>, _>>().map_err(failed)?;
         let drawn: Vec<_> = read
             .into_par_iter()

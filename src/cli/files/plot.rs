@@ -42,9 +42,10 @@ pub(in crate::cli) fn execute(arguments: &Arguments) -> Result<(), Failure> {
     let scene = looks.scene(&files[0]);
     let name = |file: &Path| file.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     let mut look = None;
+    let settings = looks.settings(title.as_deref(), Some(&files[0]), &name(&files[0]))?;
+    let colour = looks.colour(&files, &settings, &scene);
     if files.len() > 1 {
-        let settings = looks.settings(title.as_deref(), Some(&files[0]), &name(&files[0]))?;
-        look = Some(survey(&files, &looks.colour, &settings, &scene).map_err(failed)?);
+        look = Some(survey(&files, &colour, &settings, &scene).map_err(failed)?);
     }
     for (file, out) in files.iter().zip(outs) {
         let mut settings = looks.settings(title.as_deref(), Some(file), &name(file))?;
@@ -54,7 +55,7 @@ pub(in crate::cli) fn execute(arguments: &Arguments) -> Result<(), Failure> {
             // A clip common to all files may remove all particles of one of them.
             settings.may_be_empty = true;
         }
-        draw_file(file, &looks.colour, &settings, &scene, &out).map_err(failed)?;
+        draw_file(file, &colour, &settings, &scene, &out).map_err(failed)?;
         writeln!(std::io::stdout(), "{}", out.display())?;
     }
     Ok(())

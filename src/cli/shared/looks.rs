@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use super::message::warn_of;
 use crate::cli::Failure;
-use crate::io::picture::{self, Clip, Direction, Map, Scene, Settings};
+use crate::io::picture::{self, Clip, Direction, Map, Scene, SceneOf, Settings};
 use crate::io::revolve::Revolve;
 use crate::io::snapshot::Header;
 use crate::job::AnyProblem;
@@ -15,9 +15,10 @@ use crate::text::written;
 #[derive(Debug, clap::Args)]
 pub(in crate::cli) struct Looks {
     /// Quantity that gives the colours: a field of the file or a derived quantity, such as speed, pressure,
-    /// stress_xy, stress_1 (greatest principal stress) or max_shear. An unknown name lists all quantities.
-    #[arg(long, alias = "color", default_value = "leaf_level")]
-    pub(in crate::cli) colour: String,
+    /// stress_xy, stress_1 (greatest principal stress) or max_shear; by default damage or plastic strain if any
+    /// particle has some, else the speed. An unknown name lists all quantities.
+    #[arg(long, alias = "color")]
+    colour: Option<String>,
     /// Value of the first colour; by default the range of the values without the outermost 0.5 % at each end.
     #[arg(long, requires = "to", allow_negative_numbers = true)]
     from: Option<f64>,
@@ -98,6 +99,17 @@ pub(in crate::cli) fn title(given: Option<&str>, output: Option<&Path>, name: &s
 }
 
 impl Looks {
+    /// Quantity that gives the colours of these outputs, of which the last one decides where none is chosen.
+    pub(in crate::cli) fn colour(
+        &self,
+        files: &[PathBuf],
+        settings: &Settings,
+        scene: &SceneOf<'_>,
+    ) -> String {
+        let usual = || files.last().map_or("speed", |file| picture::usual_colour(file, settings, scene));
+        self.colour.clone().unwrap_or_else(|| usual().to_owned())
+    }
+
     /// Settings of a picture of an output, with its [`title`].
     ///
     /// # Errors

@@ -244,6 +244,18 @@ pub fn survey(
     Ok(all.unwrap_or(Look { range: [0.0; 2], frame: [[0.0; 3], [1.0; 3]], longest: 0.0 }))
 }
 
+/// Quantity that colours pictures of a file where nobody chooses one: damage or plastic strain if any particle
+/// differs in it from others, else the speed; the level of leaves where the file does not have that.
+pub fn usual_colour(file: &Path, settings: &Settings, scene: &SceneOf<'_>) -> &'static str {
+    let look = |name: &str| survey(&[file.to_owned()], name, settings, scene).ok();
+    let varies = |name: &&str| look(name).is_some_and(|look| look.range[1] > look.range[0]);
+    match ["damage", "plastic_strain"].into_iter().find(varies) {
+        Some(name) => name,
+        None if look("speed").is_some() => "speed",
+        None => "leaf_level",
+    }
+}
+
 /// Drawing of a quantity of a file, and its time, s.
 fn drawing(
     from: &Path,

@@ -123,7 +123,7 @@ pub(super) fn check<const D: usize>(
     refuse(file.numerics.tied_surfaces, numerics.key("tied_surfaces"), "tied surfaces", "none");
     refuse(file.water.is_some(), root.key("water"), "water in the pores", "none");
     refuse(!file.sources.is_empty(), root.key("sources"), "sources", "bodies");
-    for (i, field) in file.output.fields.iter().enumerate() {
+    for (i, field) in file.output.chosen().iter().enumerate() {
         refuse(
             matches!(field, Field::Strain | Field::EquivalentStrain),
             root.key("output").key("fields").index(i),

@@ -157,8 +157,10 @@ pub(in crate::job) fn output(checks: &mut Checks, file: &JobFile, name: &str, pa
             ),
         );
     }
-    for (i, field) in output.fields.iter().enumerate() {
-        if output.fields[..i].contains(field) {
+    let has_water =
+        file.water.is_some() || file.materials.iter().any(|material| material.undrained.is_some());
+    for (i, field) in output.chosen().iter().enumerate() {
+        if output.chosen()[..i].contains(field) {
             checks.fault(
                 &path.key("fields").index(i),
                 "found a field a second time; expected each once".into(),
@@ -174,7 +176,7 @@ pub(in crate::job) fn output(checks: &mut Checks, file: &JobFile, name: &str, pa
     OutputSetup {
         directory: directory.into(),
         every: output.every,
-        fields: output.fields.clone(),
+        fields: output.fields(has_water),
         followed: followed(output),
         restart: output.restart,
         picture: output.picture,

@@ -16,9 +16,10 @@ pub struct Output {
     #[serde(default)]
     #[schemars(range(max = 1e12), extend("exclusiveMinimum" = 0.0))]
     pub every: Option<f64>,
-    /// Particle fields.
-    #[serde(default = "default_fields")]
-    pub fields: Vec<Field>,
+    /// Particle fields; by default id, body, material, leaf_level, velocity, density, pressure, von_mises and plastic_strain, and
+    /// pore_pressure in jobs with water in pores.
+    #[serde(default)]
+    pub fields: Option<Vec<Field>>,
     /// Whether each output contains the complete state, so that a run can restart from it.
     #[serde(default = "yes")]
     pub restart: bool,
@@ -35,9 +36,25 @@ pub struct Output {
 }
 
 impl Output {
-    /// Whether the output has one of these fields.
+    /// Whether the output has one of these fields, of which none is there by default.
     pub fn has_any(&self, fields: &[Field]) -> bool {
-        self.fields.iter().chain(&self.picture_field).any(|field| fields.contains(field))
+        self.chosen().iter().chain(&self.picture_field).any(|field| fields.contains(field))
+    }
+
+    /// The fields that the job names.
+    pub fn chosen(&self) -> &[Field] {
+        self.fields.as_deref().unwrap_or_default()
+    }
+
+    /// The fields of a job with or without water in pores.
+    pub fn fields(&self, has_water: bool) -> Vec<Field> {
+        use Field::*;
+        let usual = || {
+            let fields =
+                [Id, Body, Material, LeafLevel, Velocity, Density, Pressure, VonMises, PlasticStrain];
+            fields.into_iter().chain(has_water.then_some(PorePressure)).collect()
+        };
+        self.fields.clone().unwrap_or_else(usual)
     }
 }
 
@@ -46,18 +63,13 @@ impl Default for Output {
         Self {
             directory: None,
             every: None,
-            fields: default_fields(),
+            fields: None,
             restart: true,
             picture: true,
             picture_field: None,
             report: false,
         }
     }
-}
-
-fn default_fields() -> Vec<Field> {
-    use Field::*;
-    vec![Id, Body, Material, LeafLevel, Velocity, Density, Pressure, VonMises, PlasticStrain]
 }
 
 /// Checkpoints. Without an interval, a run writes one only when asked to stop, and at its end if the outputs contain no state.
