@@ -33,11 +33,13 @@ pub enum Sampled {
     Pressure,
     /// Mean plastic strain by volume.
     PlasticStrain,
+    /// Mean pressure of the water in the pores by volume, Pa.
+    PorePressure,
 }
 
 impl Sampled {
-    /// All of them.
-    pub const ALL: [Self; 6] = [
+    /// Those of lines that name none.
+    pub const USUAL: [Self; 6] = [
         Self::VolumeFraction,
         Self::Density,
         Self::Velocity,
@@ -54,6 +56,7 @@ impl Sampled {
             Self::Stress => Some(Measured::Stress),
             Self::Pressure => Some(Measured::Pressure),
             Self::PlasticStrain => Some(Measured::PlasticStrain),
+            Self::PorePressure => Some(Measured::PorePressure),
         }
     }
 }
@@ -76,6 +79,11 @@ pub fn weight<const D: usize>(point: &[f64; D], place: &[f64; D], cell: f64) -> 
 }
 
 impl<const D: usize> Line<D> {
+    /// Those of its quantities that probes measure, too.
+    pub fn measured(&self) -> Vec<Measured> {
+        self.quantities.iter().filter_map(|quantity| quantity.mean()).collect()
+    }
+
     /// Names and units of the columns behind step and time, in the order of [`Line::values`].
     pub fn columns(&self) -> Vec<(String, &'static str)> {
         let mut columns = vec![("point".to_owned(), "")];

@@ -70,6 +70,8 @@ pub enum Measured {
     Pressure,
     /// Mean plastic strain by volume.
     PlasticStrain,
+    /// Mean pressure of the water in the pores by volume, Pa: of the water table, of seepage, and the excess in undrained ground.
+    PorePressure,
     /// Least and greatest coordinates of particles along each axis, m.
     Extent,
 }
@@ -126,6 +128,7 @@ impl Measured {
                 values.push(mean(-(xx + yy + zz) / 3.0, of.volume));
             }
             Self::PlasticStrain => values.push(mean(of.volume_strain, of.volume)),
+            Self::PorePressure => values.push(mean(of.volume_pores, of.volume)),
             Self::Extent => {
                 let is_empty = of.mass <= 0.0;
                 let place = |side: &[f64; D]| -> [f64; D] {
@@ -151,6 +154,7 @@ impl Measured {
             Self::Stress => ("stress", "Pa"),
             Self::Pressure => ("pressure", "Pa"),
             Self::PlasticStrain => ("plastic_strain", ""),
+            Self::PorePressure => ("pore_pressure", "Pa"),
             Self::Extent => ("extent", "m"),
         }
     }
@@ -183,6 +187,8 @@ pub struct Readings<const D: usize> {
     pub volume_stress: [f64; 6],
     /// Volume times plastic strain, m³.
     pub volume_strain: f64,
+    /// Volume times pressure in pores, J; 0 where no quantity asks for it.
+    pub volume_pores: f64,
     /// Greatest speed, m/s.
     pub greatest_speed: f64,
     /// Least and greatest coordinates, m, from the lower corner of the domain; infinite without particles.
@@ -193,7 +199,7 @@ pub struct Readings<const D: usize> {
 mod tests {
     use super::*;
 
-    const ALL: [Measured; 13] = [
+    const ALL: [Measured; 14] = [
         Measured::Mass,
         Measured::Volume,
         Measured::Centre,
@@ -206,6 +212,7 @@ mod tests {
         Measured::Stress,
         Measured::Pressure,
         Measured::PlasticStrain,
+        Measured::PorePressure,
         Measured::Extent,
     ];
 
@@ -218,6 +225,7 @@ mod tests {
             energies: [0.0; 3],
             volume_stress: [0.0; 6],
             volume_strain: 0.0,
+            volume_pores: 0.0,
             greatest_speed: 0.0,
             extent: [[f64::INFINITY; D], [f64::NEG_INFINITY; D]],
         };

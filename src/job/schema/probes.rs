@@ -21,7 +21,7 @@ pub struct Probe {
     pub bodies: Option<Vec<String>>,
     /// Recorded quantities; mass, centre and velocity by default.
     #[serde(default = "usual")]
-    #[schemars(length(min = 1, max = 13))]
+    #[schemars(length(min = 1, max = 14))]
     pub quantities: Vec<Measured>,
 }
 
@@ -45,7 +45,7 @@ pub struct Track {
     pub bodies: Option<Vec<String>>,
     /// Recorded quantities; centre and velocity by default.
     #[serde(default = "usual_of_track")]
-    #[schemars(length(min = 1, max = 13))]
+    #[schemars(length(min = 1, max = 14))]
     pub quantities: Vec<Measured>,
 }
 
@@ -127,7 +127,7 @@ pub struct Line {
     pub bodies: Option<Vec<String>>,
     /// Recorded quantities; all by default.
     #[serde(default = "all_sampled")]
-    #[schemars(length(min = 1, max = 6))]
+    #[schemars(length(min = 1, max = 7))]
     pub quantities: Vec<Sampled>,
 }
 
@@ -136,7 +136,7 @@ fn twenty_one() -> u32 {
 }
 
 fn all_sampled() -> Vec<Sampled> {
-    Sampled::ALL.to_vec()
+    Sampled::USUAL.to_vec()
 }
 
 /// A raster in plan, over all axes but the last, with the largest depth (m) and the largest speed of a particle (m/s) at the rows of the

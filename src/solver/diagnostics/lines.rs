@@ -1,7 +1,7 @@
 //! Sums over the material about the points of lines.
 use rayon::prelude::*;
 
-use super::probes::{of_leaf, reduced};
+use super::probes::{Wanted, of_leaf, reduced};
 use crate::grid::leaf_geometry::leaf_box;
 use crate::kernel::BLOCK;
 use crate::particle::chunk::Tag;
@@ -31,6 +31,7 @@ impl<const D: usize> Solver<D> {
         self.comm.max_u64(&mut levels);
         let cells: Vec<f64> =
             levels.iter().map(|&level| root_edge / f64::from(1_u32 << level) / BLOCK as f64).collect();
+        let wanted = Wanted::of(self, &lines.iter().flat_map(Line::measured).collect::<Vec<_>>());
         let about = |(&(line, point), &cell): (&(&Line<D>, &[f64; D]), &f64)| {
             let leaves = (0..boxes.len()).filter(|&leaf| near(leaf, point, cell));
             let partials = leaves.map(|leaf| {
@@ -40,7 +41,7 @@ impl<const D: usize> Solver<D> {
                     line.bodies.as_ref().is_none_or(|bodies| bodies.contains(&body))
                 };
                 let of = |p: usize| if counts(p) { weight(point, &chunk.position(p), cell) } else { 0.0 };
-                of_leaf(physics, chunk, false, of)
+                of_leaf(physics, chunk, &wanted, of)
             });
             partials.collect::<Vec<_>>()
         };

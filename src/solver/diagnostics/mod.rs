@@ -3,6 +3,7 @@ pub mod given_boxes;
 pub mod lines;
 pub mod maps;
 pub mod pieces;
+mod pores;
 pub mod probes;
 pub mod totals;
 pub mod tracks;

@@ -2,6 +2,7 @@
 use partition::comm::Comm;
 use rayon::prelude::*;
 
+use super::pores::Pores;
 use super::totals::{DoubleDouble, elastic_energy};
 use crate::exact_sum::ExactSum;
 use crate::particle::Layout;
@@ -12,9 +13,26 @@ use crate::simd::{LANES, Lanes, Vector};
 use crate::solver::physics::Physics;
 use crate::solver::state::Solver;
 
-/// Number of sums: mass, volume, mass times place, momentum, energies, volume times stress and plastic
-/// strain.
-const SUMS: usize = 2 + 3 + 3 + 3 + 6 + 1;
+/// Number of sums: mass, volume, mass times place, momentum, energies, volume times stress, plastic strain and
+/// pressure in pores.
+const SUMS: usize = 2 + 3 + 3 + 3 + 6 + 1 + 1;
+
+/// What is asked of particles beyond what costs nothing.
+pub(super) struct Wanted<'a, const D: usize> {
+    /// Elastic energy.
+    energy: bool,
+    /// Pressure in pores.
+    pores: Option<Pores<'a, D>>,
+}
+
+impl<'a, const D: usize> Wanted<'a, D> {
+    /// For these quantities.
+    pub(super) fn of(solver: &'a Solver<D>, quantities: &[Measured]) -> Self {
+        let has = |quantity| quantities.contains(&quantity);
+        let pores = has(Measured::PorePressure).then(|| Pores::of(solver));
+        Self { energy: has(Measured::ElasticEnergy), pores }
+    }
+}
 
 /// Sums and extremes over particles of one or more leaves.
 #[derive(Clone)]
@@ -32,10 +50,10 @@ impl<const D: usize> Solver<D> {
         }
         let physics = &self.physics;
         let partials = probes.iter().map(|probe| {
-            let wants_energy = probe.quantities.contains(&Measured::ElasticEnergy);
+            let wanted = Wanted::of(self, &probe.quantities);
             let leaves = self.chunks.par_iter().with_min_len(4).map(|chunk| {
                 let counts = |p| probe.counts(&chunk.position(p), Tag::unpack(chunk.tags()[p]).body);
-                of_leaf(physics, chunk, wants_energy, |p| f64::from(u8::from(counts(p))))
+                of_leaf(physics, chunk, &wanted, |p| f64::from(u8::from(counts(p))))
             });
             leaves.collect::<Vec<Option<Partial<D>>>>()
         });
@@ -76,6 +94,7 @@ fn readings<const D: usize>(of: impl Fn(usize) -> f64, greatest: &[f64]) -> Read
         energies: [of(8), of(9), of(10)],
         volume_stress: std::array::from_fn(|c| of(11 + c)),
         volume_strain: of(17),
+        volume_pores: of(18),
         greatest_speed: greatest[0].max(0.0).sqrt(),
         extent: [std::array::from_fn(|a| -greatest[1 + a]), std::array::from_fn(|a| greatest[1 + D + a])],
     }
@@ -95,7 +114,7 @@ impl<const D: usize> Partial<D> {
 pub(super) fn of_leaf<const D: usize>(
     physics: &Physics<D>,
     chunk: &Chunk<D>,
-    wants_energy: bool,
+    wanted: &Wanted<D>,
     weight: impl Fn(usize) -> f64,
 ) -> Option<Partial<D>> {
     let mut all = None;
@@ -107,7 +126,7 @@ pub(super) fn of_leaf<const D: usize>(
             continue;
         }
         let first = p / LANES * LANES;
-        if wants_energy && energies_from != first {
+        if wanted.energy && energies_from != first {
             energies_from = first;
             energies = Lanes::to_array(elastic_energy(physics, chunk, first));
         }
@@ -126,10 +145,11 @@ pub(super) fn of_leaf<const D: usize>(
             (values[2 + a], values[5 + a]) = (mass * x[a], mass * velocity[a]);
         }
         values[8] = 0.5 * mass * speed_squared;
-        values[9] = if wants_energy { reference * energies[p - first] } else { 0.0 };
+        values[9] = if wanted.energy { reference * energies[p - first] } else { 0.0 };
         values[10] = reference * value(Layout::<D>::WORK);
         values[11..17].copy_from_slice(&[xx, yy, zz, xy, xz, yz].map(|component| volume * component));
         values[17] = volume * value(Layout::<D>::PLASTIC_STRAIN);
+        values[18] = wanted.pores.as_ref().map_or(0.0, |pores| volume * pores.pressure(chunk, p));
         let partial = all.get_or_insert_with(Partial::<D>::nothing);
         partial.sums.iter_mut().zip(values).for_each(|(sum, value)| sum.add(value));
         let extremes = [speed_squared].into_iter().chain(x.map(|x| -x)).chain(x);

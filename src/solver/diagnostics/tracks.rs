@@ -6,7 +6,7 @@
 //! the last row of the history.
 use rayon::prelude::*;
 
-use super::probes::{Partial, of_leaf, reduced};
+use super::probes::{Partial, Wanted, of_leaf, reduced};
 use crate::adaptivity::resample::ids;
 use crate::particle::chunk::Tag;
 use crate::probe::{Measured, Readings, Track, Tracked};
@@ -66,10 +66,10 @@ impl<const D: usize> Solver<D> {
     fn read_families(&self, tracks: &[Track<D>]) -> Vec<Readings<D>> {
         let physics = &self.physics;
         let partials = tracks.iter().zip(&self.tracked).map(|(track, tracked)| {
-            let wants_energy = track.quantities.contains(&Measured::ElasticEnergy);
+            let wanted = Wanted::of(self, &track.quantities);
             let leaves = self.chunks.par_iter().with_min_len(16).map(|chunk| {
                 let weight = |p: usize| f64::from(u8::from(ids::are_kin::<D>(chunk.ids()[p], tracked.id)));
-                of_leaf(physics, chunk, wants_energy, weight)
+                of_leaf(physics, chunk, &wanted, weight)
             });
             leaves.collect::<Vec<Option<Partial<D>>>>()
         });
