@@ -36,6 +36,7 @@ const TEMPLATES: &[Template] = templates![
     "column_collapse_2d";
     "column_collapse_mohr_coulomb";
     "column_collapse";
+    "column_collapse_axisymmetric";
     "column_collapse_tall" quick "tree.base_level=0", "adaptivity.criteria.0.level=1", "adaptivity.criteria.1.level=2";
     "silo";
     "hopper" with "meshes/hopper.obj", "meshes/glass.obj" quick "time.end=0.2";
@@ -46,6 +47,9 @@ const TEMPLATES: &[Template] = templates![
     "shaken_slope" with "records/tapered_sine.csv";
     "excavation";
     "ground_at_rest";
+    "drawdown";
+    "dike";
+    "undrained_footing";
     "strip_footing";
     "clay_footing";
     "cone_penetration";

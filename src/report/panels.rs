@@ -53,7 +53,7 @@ const TOGETHER: [(&str, &[(&str, &str)]); 8] = [
         &[("splits", "splits"), ("merges", "merges"), ("merged_away", "particles merged away")],
     ),
     ("Kinetic energy that splits and merges took", &[("split_energy", "splits"), ("merge_energy", "merges")]),
-    ("Greatest speed before equilibrium", &[("peak_speed", "speed")]),
+    ("Root mean square of the speed at its last peak", &[("peak_speed", "speed")]),
     ("Unbalanced acceleration", &[("unbalanced_acceleration", "acceleration")]),
     ("Time step", &[("dt", "time step")]),
 ];
@@ -61,7 +61,7 @@ const TOGETHER: [(&str, &[(&str, &str)]); 8] = [
 const LOGARITHMIC: [&str; 2] = ["peak_speed", "unbalanced_acceleration"];
 /// Prefixes of the names of loads, probes and colliders in columns; the longest first where one is the start
 /// of another.
-const STEMS: [(&str, &str); 26] = [
+const STEMS: [(&str, &str); 27] = [
     ("angular_momentum", "Angular momentum"),
     ("contact_work", "Work of contact"),
     ("plastic_work", "Plastic work of"),
@@ -81,10 +81,11 @@ const STEMS: [(&str, &str); 26] = [
     ("spin", "Spin of"),
     ("passed", "Mass that has passed"),
     ("extent", "Extent of"),
-    ("centre", "Centre of mass of"),
+    ("centre", "Displacement of the centre of"),
     ("momentum", "Momentum of"),
     ("displacement", "Displacement of"),
     ("stress", "Mean stress of"),
+    ("pore_pressure", "Mean pore pressure of"),
     ("pressure", "Mean pressure of"),
     ("volume", "Volume of"),
     ("mass", "Mass of"),
@@ -100,6 +101,10 @@ pub(super) fn panels(history: &History) -> Vec<Panel> {
         let (title, name) = place(&column.name);
         let start = match (&*column.name, column.values.first()) {
             ("gravitational_energy", Some(first)) => *first,
+            // A settlement of millimetres does not show beside heights of metres.
+            (name, _) if name.starts_with("centre_") => {
+                column.values.iter().copied().find(|value| value.is_finite()).unwrap_or_default()
+            }
             _ => 0.0,
         };
         // No step has been done at the start.

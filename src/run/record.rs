@@ -278,7 +278,10 @@ impl<'a, const D: usize> Recorder<'a, D> {
         }
         values.extend(shift_work);
         if self.problem.has_equilibrium() {
-            values.extend(history::relaxation_values(&solver.relaxation));
+            let seeks = solver.physics.equilibrium.is_some();
+            values.extend(
+                seeks.then_some(&solver.relaxation).map_or([f64::NAN; 3], history::relaxation_values),
+            );
         }
         if self.problem.stages.len() > 1 {
             values.push((solver.physics.stage() + 1) as f64);

@@ -117,7 +117,7 @@ fn shortened(job: &str) -> String {
     short
 }
 
-/// Environment that README's first job sets up for all that follows.
+/// Environment that README sets up for all that follows.
 fn environment() -> String {
     let readme = text(Path::new("README.md"));
     let lines: Vec<&str> =
@@ -141,8 +141,7 @@ fn commands_of_the_papers_run() {
                 continue;
             }
             let Some(commands) = commands(&paper, &block) else { continue };
-            let is_readme = paper == Path::new("README.md");
-            copy.run(&place, if is_readme { "" } else { &environment }, &commands);
+            copy.run(&place, &environment, &commands);
             done += 1;
         }
     }

@@ -125,8 +125,8 @@ pub struct Line {
     #[serde(default)]
     #[schemars(length(min = 1, max = 65_535))]
     pub bodies: Option<Vec<String>>,
-    /// Recorded quantities; all by default.
-    #[serde(default = "all_sampled")]
+    /// Recorded quantities; all but pore_pressure by default.
+    #[serde(default = "usual_of_line")]
     #[schemars(length(min = 1, max = 7))]
     pub quantities: Vec<Sampled>,
 }
@@ -135,7 +135,7 @@ fn twenty_one() -> u32 {
     21
 }
 
-fn all_sampled() -> Vec<Sampled> {
+fn usual_of_line() -> Vec<Sampled> {
     Sampled::USUAL.to_vec()
 }
 

@@ -9,7 +9,7 @@ use rayon::prelude::*;
 use super::probes::{Partial, Wanted, of_leaf, reduced};
 use crate::adaptivity::resample::ids;
 use crate::particle::chunk::Tag;
-use crate::probe::{Measured, Readings, Track, Tracked};
+use crate::probe::{Readings, Track, Tracked};
 use crate::solver::state::Solver;
 
 impl<const D: usize> Solver<D> {
