@@ -156,6 +156,22 @@ fn a_block_under_water_is_buoyant() {
     assert!((history.last("work_water") / work - 1.0).abs() < 0.02, "{} J", history.last("work_water"));
 }
 
+/// Sand that flies apart under water sinks with the weight of its grains there, whatever the space between them:
+/// buoyancy of that space would throw it out of the water.
+#[test]
+fn sand_that_flies_apart_under_water_sinks() {
+    let soil = "density = 2000\nmodel = 'mohr_coulomb'\nyoung = 2e7\npoisson = 0.3\nfriction_angle = 30\n";
+    let body = "shape = { kind = 'box', min = [3.5, 0.5], max = [4.5, 1.5] }\n\
+                velocity = ['2 * (x - 4)', '2 * (y - 1)']";
+    let rest = "[time]\nend = 0.4\n[output]\npicture = false\n[history]\nevery_steps = 1\n\
+                [[probes]]\nname = 'all'\nquantities = ['volume']\n";
+    let history = history_of(&job("level = 9", soil, body, rest));
+    assert!(history.last("volume_all") > 1.5 * history.column("volume_all")[0], "it flies apart");
+    let exact = -9.81 * (1.0 - 1000.0 / 2000.0) * history.time_of_velocities();
+    let v = history.last("momentum_y") / history.last("mass");
+    assert!((v / exact - 1.0).abs() < 1e-9, "{v} m/s for {exact}");
+}
+
 /// As the table rises through ground at rest, the ground swells by its unloading: γ_w H²/(2 M).
 #[test]
 fn ground_swells_as_the_table_rises() {

@@ -14,7 +14,7 @@ use crate::load::{Carried, Kind, Load, cofactor};
 use crate::particle::chunk::{Chunk, Layout};
 use crate::particle::followed::head;
 use crate::particle::strain;
-use crate::particle::volume::volume;
+use crate::particle::volume::reference_volume;
 use crate::simd::Vector;
 use crate::solver::sorting::bins::BoxWidths;
 use crate::solver::sorting::box_bounds::Widths;
@@ -135,7 +135,9 @@ impl<const D: usize> Pushing<'_, D> {
                 let at = place(&chunk.position(p)).now;
                 let water = water.about(head(chunk, self.head, p, &load.origin));
                 let per_volume = water.force(at, half?, self.middle - load.start, &self.gravity);
-                (per_volume != [0.0; D]).then(|| per_volume.map(|force| volume(chunk, p) * force))
+                // Of the undeformed volume: water that comes as pores open, and goes as they close, has its own
+                // weight, so that the weight of grains under water stays.
+                (per_volume != [0.0; D]).then(|| per_volume.map(|force| reference_volume(chunk, p) * force))
             }
             _ => {
                 let x = chunk.position(p);
