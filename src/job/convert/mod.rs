@@ -501,13 +501,25 @@ fn body<const D: usize>(
         let below = low.is_finite() && low < -slack && !is_cut(0);
         let above = high.is_finite() && high > space.size[a] + slack && !is_cut(1);
         if below || above || low >= space.size[a] || high <= 0.0 {
-            let o = space.origin[a];
+            let (o, low_inside, high_inside) = (space.origin[a], low, high);
             let [low, high, least, most] = [low + o, high + o, o, o + space.size[a]].map(|x| number(x, 7));
             let (name, axis) = (excerpt(&body.name, QUOTED), AXES[a]);
             let side = if below { "min" } else { "max" };
-            let hint = match (below || above) && given.is_none() {
-                true => format!("; boundaries.{axis}_{side} = {{ kind = \"symmetric\" }} would cut it there"),
+            // What it needs, in whole roots, counted from the lower corner.
+            let root = file_of.domain.root_edge;
+            let needed = root * (bounds.upper[a] / root - 1e-9).ceil();
+            let grown = match bounds.lower[a] > -slack && needed > space.size[a] {
+                true => format!("; domain.size = {} along {axis} would hold it", number(needed, 7)),
                 false => String::new(),
+            };
+            let lies_inside = low_inside < space.size[a] && high_inside > 0.0;
+            let hint = match (below || above) && lies_inside && given.is_none() {
+                true => {
+                    format!(
+                        "{grown}; boundaries.{axis}_{side} = {{ kind = \"symmetric\" }} would cut it there"
+                    )
+                }
+                false => grown,
             };
             checks.fault(
                 &here,
