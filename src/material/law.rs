@@ -3,6 +3,7 @@
 use super::initial::Consolidation;
 use super::laws::hencky::Hencky;
 use super::shock::Shock;
+use super::tangent::{self, Tangent};
 use super::tensor::eigen::Symmetric;
 use super::{HISTORIES, PLASTIC_STRAIN};
 use crate::simd::{Kernel, LANES, Lanes, Vector, widest};
@@ -196,6 +197,10 @@ pub trait Material: std::fmt::Debug + Send + Sync {
     /// From the trial elastic tensor to the final one, stress, history, work and wave speed.
     fn update(&self, state: &mut State, step: &Step);
 
+    /// Derivative of the Kirchhoff stress at the end of an update by the deformation there; arguments as of
+    /// [`Material::update`], before it. Without artificial viscosity.
+    fn tangent(&self, trial: &State, step: &Step) -> Tangent;
+
     /// Elastic energy per reference volume, J/m³, of elastic tensor and history. `plane` says that the
     /// components xz and yz of all tensors are zero.
     fn energy(&self, state: &State, plane: bool) -> Lanes;
@@ -270,6 +275,10 @@ pub trait Material: std::fmt::Debug + Send + Sync {
 impl<L: Law> Material for L {
     fn update(&self, state: &mut State, step: &Step) {
         widest(Response(self, state, step));
+    }
+
+    fn tangent(&self, trial: &State, step: &Step) -> Tangent {
+        tangent::of(self, trial, step)
     }
 
     fn energy(&self, state: &State, plane: bool) -> Lanes {

@@ -16,6 +16,7 @@
 //! | `hardening/` | strength as a function of plastic strain, rate and temperature |
 //! | `shock.rs` | artificial viscosity |
 //! | `root.rs` | roots of scalar equations, lane by lane |
+//! | `tangent.rs` | derivatives of the stress by the deformation |
 //! | `tensor/` | symmetric tensors of batches: eigenvalues, logarithm, exponential |
 //! | `undrained.rs` | water that cannot leave the pores of a solid |
 //! | `driver/` | one particle along a path |
@@ -33,6 +34,7 @@ pub mod laws;
 pub mod parameters;
 mod root;
 mod shock;
+mod tangent;
 pub(crate) mod tensor;
 #[cfg(test)]
 mod tests;
@@ -42,6 +44,7 @@ pub use law::{Law, Material, State, Step};
 pub use laws::{HISTORIES, Model};
 pub use parameters::Parameters;
 pub use shock::{Shock, Viscosity};
+pub use tangent::Tangent;
 pub use tensor::eigen::{self, Symmetric};
 
 /// The history variable that measures plastic strain.

@@ -1,6 +1,7 @@
 //! Roots of scalar equations, lane by lane.
 //!
-//! A lane stops changing when it has converged, so its bits do not depend on the lanes beside it.
+//! A lane stops changing when it has converged, so its bits do not depend on the lanes beside it. Derivatives
+//! of a root ([`Vector::DERIVES`]) are those of the theorem of implicit functions, not of the search.
 use crate::simd::{Vector, VectorMask};
 
 /// Iterations at most; a lane that brackets a root to adjacent numbers by bisection alone takes fewer.
@@ -57,6 +58,10 @@ pub(super) fn newton<V: Vector>(
         let moves = pending & !value.abs().le(noise);
         x = moves.select(next, x);
         pending = pending & !done;
+    }
+    if V::DERIVES {
+        let [residual, _] = function.at(x.unknown());
+        return active.select(x.implied(residual), x);
     }
     x
 }
@@ -118,6 +123,9 @@ pub(super) fn bracketed<V: Vector>(
         x = pending.select(next, x);
         let done = value.abs().le(noise) | (above - low).le(above * TOLERANCE);
         pending = pending & !done;
+    }
+    if V::DERIVES {
+        return active.select(x.implied(function.at(x.unknown())), x);
     }
     x
 }

@@ -19,7 +19,7 @@ use super::laws::drucker_prager::DruckerPrager;
 use super::laws::mohr_coulomb::MohrCoulomb;
 use super::parameters::{OutOfRange, Parameters, ranges};
 use super::tensor::eigen::determinant;
-use super::{HISTORIES, Material, OWN, PLASTIC_VOLUME, State, Step};
+use super::{HISTORIES, Material, OWN, PLASTIC_VOLUME, State, Step, Tangent};
 use crate::simd::math::{exp, ln};
 use crate::simd::{Lanes, Vector};
 
@@ -128,6 +128,11 @@ pub fn consolidate(elastic: &[f64; 6], history: &mut [f64; HISTORIES]) {
     history[CONSOLIDATED] = volume_log(&state).to_array()[0];
 }
 
+/// The same with the volume of another history at consolidation.
+pub(super) fn consolidate_as(other: &[f64; HISTORIES], history: &mut [f64; HISTORIES]) {
+    history[CONSOLIDATED] = other[CONSOLIDATED];
+}
+
 /// Excess pore pressure u, Pa, of a particle with this elastic tensor and history, and the stiffness K/n of the
 /// water, Pa.
 pub fn excess_pressure(modulus: f64, elastic: &[f64; 6], history: &[f64; HISTORIES]) -> f64 {
@@ -150,6 +155,14 @@ impl Material for Saturated {
         let square =
             stiffness.mul_add(Lanes::splat(1.0 / self.density()), state.wave_speed * state.wave_speed);
         state.wave_speed = square.sqrt();
+    }
+
+    /// The skeleton keeps the sum of elastic and plastic volume, so the logarithm of J grows with the trace.
+    fn tangent(&self, trial: &State, step: &Step) -> Tangent {
+        let log = volume_log(trial);
+        let ratio_log = log - trial.history[CONSOLIDATED];
+        let bulk = (ratio_log + Lanes::splat(1.0)) * exp(log) * self.modulus;
+        self.skeleton.tangent(trial, step).with_bulk(bulk)
     }
 
     fn energy(&self, state: &State, plane: bool) -> Lanes {

@@ -16,6 +16,7 @@ pub use avx::{F64x4, Mask4};
 pub use portable::{F64x4, Mask4};
 
 pub use dispatch::{Kernel, widest};
+pub use dual::{DIRECTIONS, Dual};
 pub use lanes::{Lanes, Mask};
 pub use processor::missing;
 
@@ -33,6 +34,7 @@ mod avx;
 #[cfg(all(target_arch = "x86_64", target_feature = "avx2", target_feature = "fma"))]
 mod avx512;
 mod dispatch;
+mod dual;
 mod lanes;
 #[cfg(any(test, not(all(target_arch = "x86_64", target_feature = "avx2", target_feature = "fma"))))]
 // Public where it replaces AVX2, which it does not in tests on most machines.
@@ -80,6 +82,10 @@ pub trait Vector:
 {
     /// One truth value for each particle.
     type Mask: VectorMask<Self>;
+
+    /// Whether numbers carry derivatives by the principal values of a tensor ([`Dual`]). Then tensors are
+    /// diagonal: what finds principal axes step by step, or leaves the type, takes those of the coordinates.
+    const DERIVES: bool = false;
 
     /// All lanes equal to `value`.
     fn splat(value: f64) -> Self;
@@ -132,6 +138,18 @@ pub trait Vector:
         let [a, b, c, d] = F64x4::transpose([x0, y0, z0, w0]);
         let [e, f, g, h] = F64x4::transpose([x1, y1, z1, w1]);
         *rows = [a, b, c, d, e, f, g, h];
+    }
+
+    /// Where numbers carry derivatives, the same value as the unknown of an equation.
+    #[inline(always)]
+    fn unknown(self) -> Self {
+        self
+    }
+    /// Where numbers carry derivatives, the same value with those that the theorem of implicit functions
+    /// gives it as root of an equation; `residual` is that of the equation at [`Vector::unknown`].
+    #[inline(always)]
+    fn implied(self, _residual: Self) -> Self {
+        self
     }
 
     /// From an array.

@@ -1,5 +1,5 @@
 //! A material point driven along a prescribed path: `mod.rs` of deformation, `control.rs` of strains and
-//! stresses.
+//! stresses; `tangent.rs`: the derivative of its stress.
 use nalgebra::Matrix3;
 
 use super::tensor::strain::Strain;
@@ -7,6 +7,7 @@ use super::{HISTORIES, Material, State, Step, undrained};
 use crate::simd::{LANES, Lanes, Vector};
 
 pub mod control;
+mod tangent;
 
 /// A 3×3 matrix, `m[i][j]` in row i and column j.
 pub type Matrix = [[f64; 3]; 3];
@@ -31,29 +32,42 @@ pub struct Point<'a> {
     pub size: f64,
     /// Edge of the cells on which it moves, m: bounds the step of viscous flow. Infinite: none.
     pub cell: f64,
+    /// Where the last update began.
+    trial: Trial,
+}
+
+/// Arguments of an update.
+#[derive(Clone, Copy, Debug)]
+struct Trial {
+    elastic: [f64; 6],
+    history: [f64; HISTORIES],
+    step: Step,
 }
 
 impl<'a> Point<'a> {
     /// An undeformed point.
     pub fn new(material: &'a dyn Material) -> Self {
+        let (elastic, history) = ([1.0, 1.0, 1.0, 0.0, 0.0, 0.0], material.initial_history());
         let mut point = Self {
             material,
-            elastic: [1.0, 1.0, 1.0, 0.0, 0.0, 0.0],
+            elastic,
             stress: [0.0; 6],
-            history: material.initial_history(),
+            history,
             work: 0.0,
             wave_speed: 0.0,
             dt: 0.0,
             size: 0.0,
             cell: f64::INFINITY,
+            trial: Trial { elastic, history, step: Step::rest(true) },
         };
-        point.set_trial(point.elastic);
+        point.set_trial(elastic);
         point
     }
 
     /// From now on the point is of this material, the same with water that cannot leave its pores.
     pub fn close_drains(&mut self, material: &'a dyn Material) {
         undrained::consolidate(&self.elastic, &mut self.history);
+        undrained::consolidate_as(&self.history, &mut self.trial.history);
         self.material = material;
     }
 
@@ -95,6 +109,7 @@ impl<'a> Point<'a> {
         state.history = self.history.map(Lanes::splat);
         let step =
             Step { dt: self.dt, cell: self.cell, size: [self.size; LANES], ..Step::rest(self.is_plane()) };
+        self.trial = Trial { elastic: trial, history: self.history, step };
         self.material.update(&mut state, &step);
         let scalar = |lanes: Lanes| lanes.to_array()[0];
         self.elastic = state.elastic.map(scalar);

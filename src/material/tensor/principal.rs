@@ -84,6 +84,10 @@ impl<V: Vector> Lone<V> {
     #[inline(always)]
     pub(crate) fn of(deviator: &Symmetric<V>, norm: V) -> Self {
         let one = V::splat(1.0);
+        if V::DERIVES {
+            // Diagonal, and its components are the eigenvalues.
+            return Self { norm, unit: *deviator, value: one, angle: one };
+        }
         let scale = one / norm.max(V::splat(f64::MIN_POSITIVE));
         let unit = each(*deviator, |component| component * scale);
         let determinant = determinant(&unit);
@@ -104,9 +108,40 @@ impl<V: Vector> Lone<V> {
     /// nearly equal.
     #[inline(always)]
     pub(crate) fn nearly_sorted(&self) -> [V; 3] {
+        if V::DERIVES {
+            return sorted_in_axes(&self.unit);
+        }
         let half = (self.value * self.value).neg_mul_add(V::splat(0.75), V::splat(0.5));
         sorted(self.norm, self.value, half.max(V::splat(0.0)).sqrt())
     }
+}
+
+/// Components of a diagonal tensor, greatest first.
+fn sorted_in_axes<V: Vector>(tensor: &Symmetric<V>) -> [V; 3] {
+    let [x, y, z, ..] = *tensor;
+    // Equal ones keep their order, as neighbours change places only.
+    let pair = |a: V, b: V| {
+        let is_less = a.lt(b);
+        (is_less.select(b, a), is_less.select(a, b))
+    };
+    let (x, y) = pair(x, y);
+    let (y, z) = pair(y, z);
+    let (x, y) = pair(x, y);
+    [x, y, z]
+}
+
+/// The diagonal tensor with these components, which stand in the order of [`sorted_in_axes`].
+fn compose_in_axes<V: Vector>(tensor: &Symmetric<V>, sorted: &[V; 3]) -> Symmetric<V> {
+    let zero = V::splat(0.0);
+    let [x, y, z, ..] = *tensor;
+    let [first, second, third] = *sorted;
+    // The place of a component: behind greater ones, and behind equal ones that come before.
+    let placed = |ahead: [V::Mask; 2]| {
+        let [a, b] = ahead;
+        (a & b).select(third, (a | b).select(second, first))
+    };
+    let (xy, xz, yz) = (x.lt(y), x.lt(z), y.lt(z));
+    [placed([xy, xz]), placed([!xy, yz]), placed([!xz, !yz]), zero, zero, zero]
 }
 
 /// Eigenvalues, greatest first, of a deviator with this norm: those of the unit tensor are `lone` and, on
@@ -127,6 +162,19 @@ impl<V: Vector> Principal<V> {
     pub(crate) fn of(from: &Lone<V>) -> Self {
         let one = V::splat(1.0);
         let Lone { norm, unit, value: lone, angle } = *from;
+        if V::DERIVES {
+            let (square, half, half_inverse) = (unit, one, one);
+            return Self {
+                norm,
+                lone,
+                half,
+                half_inverse,
+                unit,
+                square,
+                projector: [one; 3],
+                rest: [one; 3],
+            };
+        }
         let [xx, yy, zz, xy, xz, yz] = unit;
         let square = [
             xx.mul_add(xx, xy.mul_add(xy, xz * xz)),
@@ -166,12 +214,18 @@ impl<V: Vector> Principal<V> {
     /// Eigenvalues of the deviator, greatest first.
     #[inline(always)]
     pub(crate) fn sorted(&self) -> [V; 3] {
+        if V::DERIVES {
+            return sorted_in_axes(&self.unit);
+        }
         sorted(self.norm, self.lone, self.half)
     }
 
     /// The tensor with the same directions and these eigenvalues, in the order of [`Principal::sorted`].
     #[inline(always)]
     pub(crate) fn compose(&self, sorted: &[V; 3]) -> Symmetric<V> {
+        if V::DERIVES {
+            return compose_in_axes(&self.unit, sorted);
+        }
         let zero = V::splat(0.0);
         let first = zero.lt(self.lone);
         let lone = first.select(sorted[0], sorted[2]);

@@ -35,6 +35,9 @@ impl<V: Vector> Strain<V> {
     /// Strain of a tensor.
     #[inline(always)]
     pub(crate) fn of(b: &Symmetric<V>, plane: bool) -> Self {
+        if V::DERIVES {
+            return Self::in_axes(b);
+        }
         let (mean, beside) = TraceFree::beside_unit(b);
         let near = beside.is_small() & V::splat(0.0).lt(mean);
         let (trace, deviator) = beside.ln_of_one_plus();
@@ -47,9 +50,22 @@ impl<V: Vector> Strain<V> {
         Self { trace, deviator, norm, far }
     }
 
+    /// Strain of a diagonal tensor.
+    fn in_axes(b: &Symmetric<V>) -> Self {
+        let zero = V::splat(0.0);
+        let [x, y, z] = [b[0], b[1], b[2]].map(|stretch| ln(stretch) * 0.5);
+        let trace = x + y + z;
+        let [x, y, z] = [x, y, z].map(|strain| strain - trace * (1.0 / 3.0));
+        let norm = (x * x + y * y + z * z).sqrt();
+        Self { trace, deviator: [x, y, z, zero, zero, zero], norm, far: None }
+    }
+
     /// The elastic tensor with another trace of the strain and `kept` times its deviator, from 0 to 1.
     #[inline(always)]
     fn elastic(&self, trace: V, kept: V, plane: bool) -> Symmetric<V> {
+        if V::DERIVES {
+            return exp_in_axes(trace, &each(self.deviator, |component| component * kept));
+        }
         let twice_kept = kept + kept;
         let volumetric = exp(trace * (2.0 / 3.0));
         let deviatoric = TraceFree::new(each(self.deviator, |component| component * twice_kept)).exp();
@@ -106,6 +122,9 @@ impl<V: Vector> Strain<V> {
 /// `exp(2 ε)` of a strain with this trace and this deviator.
 #[inline(always)]
 pub(crate) fn tensor_of<V: Vector>(trace: V, deviator: &Symmetric<V>, plane: bool) -> Symmetric<V> {
+    if V::DERIVES {
+        return exp_in_axes(trace, deviator);
+    }
     let twice = TraceFree::new(each(*deviator, |component| component + component));
     let near = twice.is_small();
     let volumetric = exp(trace * (2.0 / 3.0));
@@ -114,6 +133,15 @@ pub(crate) fn tensor_of<V: Vector>(trace: V, deviator: &Symmetric<V>, plane: boo
         let (mut own, trace) = (cast(&tensor), Lanes::new(trace.to_array()));
         far_tensor_of(&mut own, Mask::from_bits((!near).bits()), trace, &cast(deviator), plane);
         tensor = cast(&own);
+    }
+    tensor
+}
+
+/// `exp(2 ε)` of a diagonal strain.
+fn exp_in_axes<V: Vector>(trace: V, deviator: &Symmetric<V>) -> Symmetric<V> {
+    let mut tensor = *deviator;
+    for normal in &mut tensor[..3] {
+        *normal = exp((*normal + trace * (1.0 / 3.0)) * 2.0);
     }
     tensor
 }
