@@ -74,6 +74,13 @@ pub struct Arguments {
     #[arg(long, default_value_t = 0.0, allow_negative_numbers = true)]
     pub size: f64,
 
+    /// Add the tangent of the last substep of each row: the derivative of the Kirchhoff stress by the strain,
+    /// Pa, as columns tangent_xx_xx to tangent_yz_yz (component of the stress, component of the strain; shear
+    /// strains count twice). tangent_error is the greatest difference from differences of the stress, as a
+    /// share of the modulus of pressure waves: below 1e-6, but at corners of a yield surface
+    #[arg(long)]
+    pub tangent: bool,
+
     /// Draw stress, strain and stress path into this file (SVG)
     #[arg(long, value_name = "FILE.svg")]
     pub plot: Option<PathBuf>,
@@ -205,7 +212,7 @@ fn drive(args: &Arguments, out: &mut dyn Write) -> Result<(), MaterialError> {
             closed: Some(undrained::build(&parameters, Some(&water), args.density)),
         },
     };
-    let mut table = Table::new(ground.names(), ground.closed.is_some());
+    let mut table = Table::new(ground.names(), ground.closed.is_some(), args.tangent);
     let driven = match drive {
         Drive::Deformation(rows) => deform(&ground, &rows, args, &place, &mut table),
         Drive::Control(rows) => control(&ground, &rows, args, &place, &mut table),
@@ -342,14 +349,11 @@ fn read(path: &Path) -> Result<String, MaterialError> {
 mod tests {
     use super::*;
 
-    fn result(model: &str, name: &str, path: &str, substeps: u32) -> Result<String, String> {
-        let directory = tempfile::tempdir().unwrap();
-        let file = directory.path().join(name);
-        std::fs::write(&file, path).unwrap();
-        let args = Arguments {
+    fn arguments(model: &str) -> Arguments {
+        Arguments {
             model: model.to_string(),
             density: 1000.0,
-            substeps,
+            substeps: 1,
             test: None,
             pressure: 1e5,
             range: None,
@@ -357,9 +361,17 @@ mod tests {
             duration: 0.0,
             undrained: None,
             size: 0.0,
+            tangent: false,
             plot: None,
-            path: Some(file),
-        };
+            path: None,
+        }
+    }
+
+    fn result(model: &str, name: &str, path: &str, substeps: u32) -> Result<String, String> {
+        let directory = tempfile::tempdir().unwrap();
+        let file = directory.path().join(name);
+        std::fs::write(&file, path).unwrap();
+        let args = Arguments { substeps, path: Some(file), ..arguments(model) };
         let mut out = Vec::new();
         drive(&args, &mut out).map_err(|error| error.to_string())?;
         Ok(String::from_utf8(out).unwrap())
@@ -404,20 +416,9 @@ mod tests {
     }
 
     fn tested(model: &str, test: Trial, pressure: f64, range: f64) -> Result<Vec<Vec<f64>>, String> {
-        let args = Arguments {
-            model: model.to_string(),
-            density: 1000.0,
-            substeps: 1,
-            test: Some(test),
-            pressure,
-            range: Some(range),
-            rows: 40,
-            duration: 1.0,
-            undrained: None,
-            size: 0.0,
-            plot: None,
-            path: None,
-        };
+        let range = Some(range);
+        let args =
+            Arguments { test: Some(test), pressure, range, rows: 40, duration: 1.0, ..arguments(model) };
         let mut out = Vec::new();
         drive(&args, &mut out).map_err(|error| error.to_string())?;
         let text = String::from_utf8(out).unwrap();
@@ -492,26 +493,51 @@ mod tests {
         );
     }
 
+    /// Clay in an undrained test from beyond its preconsolidation: each row has the tangent of its last substep.
+    #[test]
+    fn tangents_are_columns() {
+        let clay = "model = 'cam_clay', shear_modulus = 4e6, critical_stress_ratio = 1.2, compression_index = 0.1, \
+                    swelling_index = 0.02, pressure = 1e4, preconsolidation_pressure = 1e5";
+        let water = Some("bulk_modulus = 1e7, porosity = 0.5".to_owned());
+        let (test, range) = (Some(Trial::Triaxial), Some(-0.05));
+        let (rows, substeps, undrained) = (10, 3, water);
+        let args = Arguments {
+            test,
+            range,
+            rows,
+            substeps,
+            undrained,
+            pressure: 1.5e5,
+            tangent: true,
+            ..arguments(clay)
+        };
+        let mut out = Vec::new();
+        drive(&args, &mut out).unwrap();
+        let text = String::from_utf8(out).unwrap();
+        let names: Vec<&str> = text.lines().next().unwrap().split(',').collect();
+        let column = |name: &str| names.iter().position(|other| *other == name).unwrap();
+        assert_eq!(column("tangent_error") - column("tangent_xx_xx"), 36);
+        assert_eq!(column("tangent_yy_xz") - column("tangent_xx_xx"), 10);
+        let rows: Vec<Vec<f64>> =
+            text.lines().skip(1).map(|line| line.split(',').map(|f| f.parse().unwrap()).collect()).collect();
+        assert_eq!(rows.len(), 12);
+        for row in &rows {
+            assert!(row[column("tangent_error")] < 1e-6, "{row:?}");
+        }
+        // Undeformed: p/κ + 4/3 G; then with water, whose stiffness is 2e7 Pa.
+        let [first, last] = [&rows[0], &rows[11]].map(|row| row[column("tangent_xx_xx")]);
+        assert!((first - 1e4 / 0.02 - 4.0 / 3.0 * 4e6).abs() < 1.0, "{first}");
+        assert!(last > 2e7 && last < 3e7, "{last}");
+    }
+
     #[test]
     fn states_are_drawn() {
         let directory = tempfile::tempdir().unwrap();
         let picture = directory.path().join("sand.svg");
-        let mut table = Table::new(&[], false);
+        let mut table = Table::new(&[], false, false);
         let material = build(&SAND.parse().unwrap(), 1600.0);
-        let args = Arguments {
-            model: SAND.to_string(),
-            density: 1600.0,
-            substeps: 1,
-            test: Some(Trial::Triaxial),
-            pressure: 1e5,
-            range: Some(-0.05),
-            rows: 20,
-            duration: 0.0,
-            undrained: None,
-            size: 0.0,
-            plot: None,
-            path: None,
-        };
+        let (test, range) = (Some(Trial::Triaxial), Some(-0.05));
+        let args = Arguments { density: 1600.0, test, range, rows: 20, ..arguments(SAND) };
         let rows = trial::rows(Trial::Triaxial, &args).unwrap();
         control(&Ground { drained: material, closed: None }, &rows, &args, "", &mut table).unwrap();
         chart::draw(&table, &picture).unwrap();

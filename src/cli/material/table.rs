@@ -29,16 +29,18 @@ pub(super) struct Invariants {
 pub(super) struct Table {
     names: Vec<String>,
     histories: usize,
-    /// Whether there are columns of water in the pores.
+    /// Whether there are columns of water in the pores, and of the tangent.
     has_water: bool,
+    has_tangent: bool,
     rows: Vec<Vec<f64>>,
     /// For pictures.
     pub invariants: Vec<Invariants>,
 }
 
 impl Table {
-    /// No states yet, of a material with these history variables, and perhaps with water in its pores.
-    pub(super) fn new(histories: &[&str], has_water: bool) -> Self {
+    /// No states yet, of a material with these history variables, perhaps with water in its pores, perhaps
+    /// with its tangents.
+    pub(super) fn new(histories: &[&str], has_water: bool, has_tangent: bool) -> Self {
         let mut names = Vec::new();
         let tensor = |name: &'static str| COMPONENTS.iter().map(move |c| format!("{name}_{c}"));
         names.extend(tensor("tau").chain(tensor("b")));
@@ -49,7 +51,13 @@ impl Table {
         if has_water {
             names.extend(["excess_pore_pressure", "effective_p"].map(str::to_owned));
         }
-        Self { names, histories: histories.len(), has_water, rows: Vec::new(), invariants: Vec::new() }
+        if has_tangent {
+            let of_row = |row| COMPONENTS.iter().map(move |column| format!("tangent_{row}_{column}"));
+            names.extend(COMPONENTS.iter().flat_map(of_row));
+            names.push("tangent_error".to_owned());
+        }
+        let (rows, invariants) = (Vec::new(), Vec::new());
+        Self { names, histories: histories.len(), has_water, has_tangent, rows, invariants }
     }
 
     /// Appends a state.
@@ -69,6 +77,10 @@ impl Table {
         if self.has_water {
             let excess = point.excess_pore_pressure();
             row.extend([excess, p - excess]);
+        }
+        if self.has_tangent {
+            row.extend(point.tangent().iter().flatten());
+            row.push(point.tangent_error());
         }
         // No negative zeros.
         self.rows.push(row.into_iter().map(|number| number + 0.0).collect());
