@@ -322,6 +322,8 @@ fn solution(columns: &[Vec<f64>], right: &[f64]) -> Option<Vec<f64>> {
 }
 
 #[cfg(test)]
+mod newton;
+#[cfg(test)]
 mod tests {
     use super::Prescribed::{Strain, Stress};
     use super::*;
