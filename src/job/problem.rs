@@ -15,7 +15,7 @@ use crate::load::{Gravity, Load, Seepage, Water};
 use crate::material::initial::Consolidation;
 use crate::material::parameters::Parameters;
 use crate::material::undrained::{self, Undrained};
-use crate::material::{Material, Viscosity};
+use crate::material::{Failed, Material, Viscosity};
 use crate::particle::followed::Followed;
 use crate::particle::given::Given;
 use crate::probe::{Flux, Line, Map, Probe, Track};
@@ -335,6 +335,8 @@ pub struct MaterialSetup {
     pub model: Parameters,
     /// Water that cannot leave its pores.
     pub undrained: Option<Undrained>,
+    /// What becomes of its particles when they fail.
+    pub failed: Failed,
 }
 
 impl MaterialSetup {

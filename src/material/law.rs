@@ -190,6 +190,11 @@ pub trait Law: std::fmt::Debug + Send + Sync {
     fn alike(&self, _a: &[f64; HISTORIES], _b: &[f64; HISTORIES]) -> bool {
         true
     }
+
+    /// See [`Material::has_failed`].
+    fn has_failed(&self, _history: &[f64; HISTORIES]) -> bool {
+        false
+    }
 }
 
 /// A constitutive model with its parameters, called once for each batch of particles.
@@ -265,6 +270,11 @@ pub trait Material: std::fmt::Debug + Send + Sync {
     /// and volume: unlike damage does not mix.
     fn alike(&self, a: &[f64; HISTORIES], b: &[f64; HISTORIES]) -> bool;
 
+    /// Whether a particle with this history has failed: its damage is complete.
+    fn has_failed(&self, _history: &[f64; HISTORIES]) -> bool {
+        false
+    }
+
     /// True for models that flow: they have history, do plastic work, and their stretch since the
     /// start is unbounded.
     fn is_plastic(&self) -> bool {
@@ -336,6 +346,10 @@ impl<L: Law> Material for L {
 
     fn alike(&self, a: &[f64; HISTORIES], b: &[f64; HISTORIES]) -> bool {
         Law::alike(self, a, b)
+    }
+
+    fn has_failed(&self, history: &[f64; HISTORIES]) -> bool {
+        Law::has_failed(self, history)
     }
 }
 

@@ -47,6 +47,18 @@ pub use shock::{Shock, Viscosity};
 pub use tangent::Tangent;
 pub use tensor::eigen::{self, Symmetric};
 
+/// What becomes of a particle whose material has failed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Failed {
+    /// It stays, with what its law leaves it.
+    #[default]
+    Stays,
+    /// It is deleted.
+    Delete,
+    /// It becomes the material of this number.
+    Becomes(u16),
+}
+
 /// The history variable that measures plastic strain.
 pub const PLASTIC_STRAIN: usize = 0;
 /// The history variable that is the logarithm of the plastic volume ratio; 0 for models without.

@@ -230,6 +230,10 @@ impl Material for Saturated {
         self.skeleton.alike(a, b)
     }
 
+    fn has_failed(&self, history: &[f64; HISTORIES]) -> bool {
+        self.skeleton.has_failed(history)
+    }
+
     fn water_modulus(&self) -> f64 {
         self.modulus
     }

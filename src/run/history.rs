@@ -6,11 +6,12 @@ use crate::boundary::{Collider, ColliderState};
 use crate::exact_sum::ExactSum;
 use crate::io::log::history::Column;
 use crate::job::Problem;
+use crate::material::Failed;
 use crate::probe;
 use crate::setup;
 use crate::solver::diagnostics::totals::{GridTotals, ParticleTotals};
 use crate::solver::migration::crossings::Crossings;
-use crate::solver::state::bookings::{ForceAndWork, Reaction, SOURCE_SUMS};
+use crate::solver::state::bookings::{FAILED_SUMS, ForceAndWork, Reaction, SOURCE_SUMS};
 use crate::solver::state::relaxation::Relaxation;
 
 const fn column(name: &'static str, unit: &'static str) -> Column<'static> {
@@ -43,7 +44,7 @@ const COLUMNS: [Column<'static>; 20] = [
 
 /// Names and units of the columns after the step. Parts of a job add their own in this order: splits and
 /// merges of dynamic refinement; the work of the shift of fluids; the progress towards equilibrium; the
-/// number of the stage, from 1; sources; water in the pores; loads; contacts between bodies; probes; tracks; fluxes; faces of the
+/// number of the stage, from 1; sources; failed particles; water in the pores; loads; contacts between bodies; probes; tracks; fluxes; faces of the
 /// domain; colliders.
 pub fn columns<const D: usize>(problem: &Problem<D>) -> Vec<(String, &'static str)> {
     let mut columns: Vec<(String, &'static str)> =
@@ -64,6 +65,11 @@ pub fn columns<const D: usize>(problem: &Problem<D>) -> Vec<(String, &'static st
         columns.push((format!("fed_{}", source.name), "kg"));
         AXES[..D].iter().for_each(|axis| columns.push((format!("fed_{}{axis}", source.name), "kg m/s")));
         columns.push((format!("fed_energy_{}", source.name), "J"));
+    }
+    if problem.materials.iter().any(|material| material.failed != Failed::Stays) {
+        columns.extend(["failed", "failed_mass"].iter().zip(["", "kg"]).map(|(n, u)| ((*n).to_owned(), u)));
+        AXES[..D].iter().for_each(|axis| columns.push((format!("failed{axis}"), "kg m/s")));
+        columns.extend(FAILED_ENERGIES.map(|name| (name.to_owned(), "J")));
     }
     if problem.output.followed.saturation {
         columns.push(("pore_water".to_owned(), "kg"));
@@ -123,6 +129,16 @@ pub fn columns<const D: usize>(problem: &Problem<D>) -> Vec<(String, &'static st
 /// Columns of runs with dynamic refinement: sums since the start.
 const LEDGER: [(&str, &str); 5] =
     [("splits", ""), ("merges", ""), ("merged_away", ""), ("split_energy", "J"), ("merge_energy", "J")];
+
+/// Columns of energies that go with failed particles.
+const FAILED_ENERGIES: [&str; 4] =
+    ["failed_kinetic_energy", "failed_elastic_energy", "failed_gravitational_energy", "failed_plastic_work"];
+
+/// The values of a row for particles that have failed and gone.
+pub fn failed_values<const D: usize>(sums: &[f64; FAILED_SUMS]) -> impl Iterator<Item = f64> {
+    let [deleted, changed, mass, x, y, z, energies @ ..] = *sums;
+    [deleted + changed, mass].into_iter().chain([x, y, z].into_iter().take(D)).chain(energies)
+}
 
 /// Columns of runs towards equilibrium.
 const RELAXATION: [(&str, &str); 3] =

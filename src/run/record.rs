@@ -16,10 +16,10 @@ use crate::job::problem::Coordinates;
 use crate::probe;
 use crate::probe::line::Sample;
 use crate::solver::diagnostics::totals::{self, GridTotals, ParticleTotals};
-use crate::solver::state::bookings::{FACE_SUMS, Reaction};
+use crate::solver::state::bookings::{FACE_SUMS, FAILED_SUMS, Reaction};
 use crate::solver::state::phases::Phase;
 use crate::solver::{Clock, Solver};
-use crate::text::quantity;
+use crate::text::{count, quantity};
 
 /// Writes history, telemetry and messages of a run. Rank 0 holds the files, all ranks make the same calls.
 pub struct Recorder<'a, const D: usize> {
@@ -250,6 +250,7 @@ impl<'a, const D: usize> Recorder<'a, D> {
         let clock = solver.clock;
         let reactions = solver.reactions();
         let sources = solver.source_sums.totals(comm);
+        let failed = solver.failed_totals();
         let pores = solver.pore_sums.totals(comm);
         let flows = solver.flow_sums.totals(comm);
         let loads = solver.load_totals();
@@ -287,6 +288,7 @@ impl<'a, const D: usize> Recorder<'a, D> {
             values.push((solver.physics.stage() + 1) as f64);
         }
         sources.iter().for_each(|sums| values.extend(history::source_values::<D>(sums)));
+        failed.iter().for_each(|sums| values.extend(history::failed_values::<D>(sums)));
         pores.iter().for_each(|sums| values.extend(history::source_values::<D>(sums)));
         values.extend(flows.as_flattened());
         loads.iter().for_each(|load| values.extend(history::force_and_work::<D>(load, true)));
@@ -428,5 +430,17 @@ impl<'a, const D: usize> Recorder<'a, D> {
         if !crossings.is_empty() {
             self.message(&crossings);
         }
+        if let Some(failed) = solver.failed_totals().as_ref().and_then(failed_line) {
+            self.message(&failed);
+        }
     }
+}
+
+/// One line for the end of a run about particles that have failed; `None` if none has.
+fn failed_line(&[deleted, changed, mass, ..]: &[f64; FAILED_SUMS]) -> Option<String> {
+    let deletion = format!("were deleted ({})", quantity(mass, "kg"));
+    let parts = [(deleted, deletion), (changed, "became another material".to_owned())];
+    let told = parts.iter().filter(|(number, _)| *number > 0.0);
+    let told: Vec<String> = told.map(|(number, what)| format!("{} {what}", count(*number as u64))).collect();
+    (!told.is_empty()).then(|| format!("particles that have failed: {}", told.join(", ")))
 }

@@ -101,6 +101,7 @@ pub fn scalars<const D: usize>(
     measures::write(comm, problem, solver, &mut reals, &mut counts, &mut exact);
     write_exact_sums("collider", &solver.contacts.sums, comm, &mut reals, &mut exact);
     write_exact_sums("source", &solver.source_sums, comm, &mut reals, &mut exact);
+    write_exact_sums("failed", &solver.failed_sums, comm, &mut reals, &mut exact);
     write_exact_sums("pore_water", &solver.pore_sums, comm, &mut reals, &mut exact);
     write_exact_sums("flow", &solver.flow_sums, comm, &mut reals, &mut exact);
     write_exact_sums("load", &solver.load_sums, comm, &mut reals, &mut exact);
@@ -388,6 +389,8 @@ fn restored<const D: usize>(
         .ok_or_else(|| refused("the state of a collider is missing"))?;
     restore_exact_sums("source", &mut solver.source_sums, rank, scalars)
         .ok_or_else(|| refused("the sums of a source are missing"))?;
+    restore_exact_sums("failed", &mut solver.failed_sums, rank, scalars)
+        .ok_or_else(|| refused("the sums of particles that have failed are missing"))?;
     restore_exact_sums("pore_water", &mut solver.pore_sums, rank, scalars)
         .and_then(|()| restore_exact_sums("flow", &mut solver.flow_sums, rank, scalars))
         .ok_or_else(|| refused("the sums of the water in the pores are missing"))?;

@@ -36,6 +36,7 @@ fn constant_physics<const D: usize>(problem: &Problem<D>) -> Physics<D> {
         root_edge: problem.root_edge,
         graded: problem.tree.graded,
         materials: problem.materials.iter().map(|m| m.build()).collect(),
+        failed: problem.materials.iter().map(|material| material.failed).collect(),
         gravity: problem.gravity.clone(),
         loads: problem.loads.clone(),
         seepage: problem.seepage.clone(),

@@ -154,7 +154,9 @@ pub fn enter_next<const D: usize>(
     comm.sum_u64(&mut come);
     let change = Change {
         is_removed,
-        materials: bodies.map(|body| material_of(problem, body, stage) as u16).collect(),
+        materials: bodies
+            .map(|body| [stage - 1, stage].map(|stage| material_of(problem, body, stage) as u16))
+            .collect(),
         at_rest: problem.stages[stage].at_rest,
         reset_displacement: problem.stages[stage].reset_displacement,
         added,

@@ -76,6 +76,7 @@ impl<const D: usize> Solver<D> {
             body_sums: ExactSums::new(physics.body_contacts.names.len(), clock.time),
             shift_sums: ExactSums::new(usize::from(physics.has_fluids()), clock.time),
             source_sums: ExactSums::new(physics.sources.len(), clock.time),
+            failed_sums: ExactSums::new(usize::from(physics.can_fail()), clock.time),
             pore_sums: ExactSums::new(usize::from(physics.followed.saturation), clock.time),
             flow_sums: ExactSums::new(physics.seepage.as_ref().map_or(0, |s| s.heads.len() + 1), clock.time),
             unsettled_heads: 0,

@@ -6,7 +6,7 @@ use crate::boundary::absorbing::AbsorbingFaces;
 use crate::boundary::{BodyContacts, Collider, Contact, Leaving, Meets};
 use crate::kernel::{BoxPolicy, Coordinates, Scheme, Transfer};
 use crate::load::{self, Gravity, Load, Seepage, Water};
-use crate::material::{Material, Viscosity};
+use crate::material::{Failed, Material, Viscosity};
 use crate::particle::chunk::{Chunk, Layout, Tag};
 use crate::particle::followed::{FirstColumns, Followed};
 use crate::particle::group::Group;
@@ -24,6 +24,8 @@ pub struct Physics<const D: usize> {
     pub graded: bool,
     /// Materials by index.
     pub materials: Vec<Box<dyn Material>>,
+    /// What becomes of particles that have failed, by material.
+    pub failed: Vec<Failed>,
     /// Times at which the stages so far have begun, s; the last is the one under way.
     pub stage_starts: Vec<f64>,
     /// Acceleration of gravity.
@@ -106,6 +108,11 @@ pub struct StepControl {
 }
 
 impl<const D: usize> Physics<D> {
+    /// Whether particles of any material go when they fail.
+    pub(crate) fn can_fail(&self) -> bool {
+        self.failed.iter().any(|rule| *rule != Failed::Stays)
+    }
+
     /// Number of the stage under way, from 0.
     pub fn stage(&self) -> usize {
         self.stage_starts.len().saturating_sub(1)

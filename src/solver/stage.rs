@@ -13,8 +13,8 @@ use crate::solver::step::relax::stop;
 pub struct Change<const D: usize> {
     /// Whether the particles of a body go.
     pub is_removed: Vec<bool>,
-    /// Material of the particles of each body.
-    pub materials: Vec<u16>,
+    /// Material of the particles of each body before and from now on; what has become rubble stays it.
+    pub materials: Vec<[u16; 2]>,
     /// Whether all particles are at rest.
     pub at_rest: bool,
     /// Whether displacements and total strains are counted from here.
@@ -96,11 +96,11 @@ fn remove<const D: usize>(chunk: &mut Chunk<D>, is_removed: &[bool]) {
 }
 
 /// Gives the particles of each body its material; where that has other history variables, they begin anew.
-fn change_materials<const D: usize>(chunk: &mut Chunk<D>, materials: &[u16], physics: &Physics<D>) {
+fn change_materials<const D: usize>(chunk: &mut Chunk<D>, materials: &[[u16; 2]], physics: &Physics<D>) {
     for p in 0..chunk.len() {
         let was = Tag::unpack(chunk.tags()[p]);
-        let material = materials[usize::from(was.body)];
-        if material == was.material {
+        let [before, material] = materials[usize::from(was.body)];
+        if material == was.material || before != was.material {
             continue;
         }
         chunk.tags_mut()[p] = halvings::with(chunk.tags()[p], Tag { material, ..was });

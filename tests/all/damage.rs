@@ -1,5 +1,6 @@
 //! Claim: a bar of brittle material breaks at its strength and takes the energy of fracture, whatever the
-//! cells; same bits on any ranks and threads, and across a restart while it cracks and particles split.
+//! cells; same bits on any ranks and threads, and across a restart while it cracks and particles split. Failed
+//! particles that are deleted or become rubble leave mass, momentum and energy in balance.
 use crate::common::history::History;
 use crate::common::launch::{job, run, succeed, text};
 use crate::common::restart;
@@ -42,5 +43,43 @@ fn damage_is_the_same_on_any_ranks_and_across_restart() {
     restart::assert_same_in_all_ways("brittle_bar_refined", |history| {
         assert!(history.last("particles") > history.column("particles")[0]);
         assert!(history.last("plastic_work") > 0.3 * ENERGY * AREA);
+    });
+}
+
+/// A plate of metal that is deleted where it fails flies into rock that becomes rubble: mass is kept exactly,
+/// momentum to round-off, no energy comes, on any ranks and across restarts.
+#[test]
+fn what_fails_goes_with_its_mass_momentum_and_energy() {
+    restart::assert_same_in_all_ways("failing_blocks", |history| {
+        let [first, last] = [0, history.column("mass").len() - 1];
+        let at = |name: &str, row: usize| history.column(name)[row];
+        let sum = |names: &[&str], row: usize| names.iter().map(|name| at(name, row)).sum::<f64>();
+        assert!(at("failed", last) > 50.0 && at("failed_mass", last) > 0.0);
+        assert!(at("particles", last) != at("particles", first));
+        let mass = |row| sum(&["mass", "failed_mass"], row);
+        assert!((mass(last) / mass(first) - 1.0).abs() < 1e-13, "{} {}", mass(first), mass(last));
+        // Rubble stays in its body.
+        assert!((at("mass_block", last) / at("mass_block", first) - 1.0).abs() < 1e-13);
+        for axis in ["_x", "_y"] {
+            let momentum = |row| sum(&[&format!("momentum{axis}"), &format!("failed{axis}")], row);
+            let scale = at("momentum_x", first);
+            assert!((momentum(last) - momentum(first)).abs() < 1e-11 * scale, "{axis}");
+        }
+        let energies = [
+            "kinetic_energy",
+            "elastic_energy",
+            "plastic_work",
+            "split_energy",
+            "merge_energy",
+            "failed_kinetic_energy",
+            "failed_elastic_energy",
+            "failed_gravitational_energy",
+            "failed_plastic_work",
+        ];
+        let (start, end) = (sum(&energies, first), sum(&energies, last));
+        println!("energy {start:.5e} J, at the end {end:.5e} J");
+        assert!(end < 1.002 * start && end > 0.6 * start, "{start} {end}");
+        // What has passed and what is deleted beyond the plane is counted.
+        assert!(at("passed_gate", last) > 0.0);
     });
 }

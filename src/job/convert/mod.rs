@@ -10,6 +10,7 @@
 //! | `axisymmetry` | what axisymmetric jobs cannot have |
 //! | `colliders` | colliders and their motion |
 //! | `contact` | contact between bodies |
+//! | `failed` | what becomes of failed particles |
 //! | `loads` | loads and quantities |
 //! | `probes` | probes, tracks, fluxes, lines and maps |
 //! | `sources` | sources |
@@ -32,6 +33,7 @@ use super::schema::job_file::{self as file, JobFile};
 use crate::geometry::written::{Shape as Written, Vector};
 use crate::geometry::{Aabb, Sampling, Shape};
 use crate::load::{Gravity, Load};
+use crate::material::Failed;
 use crate::material::parameters::{OutOfRange, Parameters};
 use crate::material::undrained::Undrained;
 use crate::particle::followed::Motion;
@@ -45,6 +47,7 @@ mod axisymmetry;
 mod checks;
 mod colliders;
 mod contact;
+mod failed;
 mod loads;
 mod overlap;
 mod probes;
@@ -393,7 +396,13 @@ fn materials(checks: &mut Checks, materials: &[file::Material], path: &Path) -> 
             checks.fault(&path.index(i).key("strength_factor"), message.into());
         }
     }
-    materials.iter().map(material_setup).collect()
+    (0..)
+        .zip(materials)
+        .map(|(i, material)| {
+            let failed = failed::failed(checks, material, materials, &path.index(i).key("failed"));
+            MaterialSetup { failed, ..material_setup(material) }
+        })
+        .collect()
 }
 
 /// Faults of water in the pores of a material.
@@ -414,6 +423,7 @@ fn material_setup(material: &file::Material) -> MaterialSetup {
         saturated_density: material.saturated_density.unwrap_or(material.density),
         model: weakened.unwrap_or_else(|| material.model.clone()),
         undrained: material.undrained,
+        failed: Failed::Stays,
     }
 }
 

@@ -319,9 +319,28 @@ pub struct Material {
     /// with. `density` is that of skeleton and water. By default there is none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub undrained: Option<Undrained>,
+    /// What becomes of particles that fail, of materials with `damage`: by default they stay, with what their law leaves them.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub failed: Option<Failed>,
     /// Constitutive model and its parameters.
     #[serde(flatten)]
     pub model: Parameters,
+}
+
+/// What becomes of particles that have failed: those of `von_mises` with a damage of 0.99 of strength, those of `hencky` with a hundredth of
+/// their strength left. How many they are, and the mass, momentum and energy that go with them, are columns of `history.csv`: `failed`,
+/// `failed_mass`, `failed_x` and so on, `failed_kinetic_energy`, `failed_elastic_energy`, `failed_gravitational_energy`, `failed_plastic_work`.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Failed {
+    /// They stay, with what their law leaves them: pressure alone in `von_mises`.
+    Stays,
+    /// They are deleted, with the loads that they carry.
+    Delete,
+    /// They become another material of the job, of this name, a solid of the same density, such as sand: rubble. Mass, velocity and volume stay;
+    /// shear stress goes, and the pressure is that of the volume in the new material. Bodies of `stages` that change their material do not
+    /// change that of their rubble.
+    Material(String),
 }
 
 /// A body: a shape filled with particles of a material.

@@ -211,6 +211,10 @@ impl Law for Brittle {
     fn alike(&self, a: &[f64; HISTORIES], b: &[f64; HISTORIES]) -> bool {
         a[BAND] == b[BAND] && (a[DAMAGE] - b[DAMAGE]).abs() <= ALIKE
     }
+
+    fn has_failed(&self, history: &[f64; HISTORIES]) -> bool {
+        history[DAMAGE] > 0.0 && history[DAMAGE] >= self.curve.failed(history[BAND])
+    }
 }
 
 const _: () = assert!(Brittle::HISTORIES <= HISTORIES);

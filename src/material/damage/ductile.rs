@@ -26,6 +26,8 @@ const INDEX: usize = OWN;
 const ALIKE: f64 = 0.01;
 /// Greatest σ*.
 const TRIAXIAL: f64 = 3.0;
+/// Damage with which the metal has failed.
+const FAILED: f64 = 0.99;
 /// Least failure strain.
 const LEAST: f64 = 1e-6;
 
@@ -225,6 +227,10 @@ impl Law for Ductile {
     fn alike(&self, a: &[f64; HISTORIES], b: &[f64; HISTORIES]) -> bool {
         let damage = |history: &[f64; HISTORIES]| ((history[INDEX] - 1.0) / self.softening).clamp(0.0, 1.0);
         (a[INDEX] - b[INDEX]).abs() <= ALIKE && (damage(a) - damage(b)).abs() <= ALIKE
+    }
+
+    fn has_failed(&self, history: &[f64; HISTORIES]) -> bool {
+        history[INDEX] >= FAILED.mul_add(self.softening, 1.0)
     }
 }
 

@@ -15,7 +15,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::material::root::{Function, newton};
 use crate::simd::math::exp;
-use crate::simd::{Vector, VectorMask};
+use crate::simd::{Lanes, Vector, VectorMask};
 
 /// How the stress of a crack band falls with its greatest strain κ, from the strength f at the onset ε₀. The
 /// energy of fracture G and the width h of the band set how fast.
@@ -44,6 +44,9 @@ impl Softening {
 /// Greatest range of the softening over the onset: that of particles without a band, which keep their
 /// strength.
 const ENDLESS: f64 = 1e6;
+
+/// Part of the strength that is left in a band that has failed.
+const LEFT: f64 = 0.01;
 
 /// Stress over Young's modulus as a function of strain.
 #[derive(Clone, Copy, Debug)]
@@ -125,6 +128,17 @@ impl Curve {
                 exp(-(opening / range)) * self.onset
             }
         }
+    }
+
+    /// Damage from which a band of this width (m) has failed: a hundredth of the strength is left.
+    pub(super) fn failed(&self, band: f64) -> f64 {
+        let range = self.range(Lanes::splat(band)).to_array()[0];
+        let strain = match self.kind {
+            Softening::Linear => range - LEFT * (range - self.onset),
+            Softening::ExponentialTotalStrain => range.mul_add(-libm::log(LEFT), self.onset),
+            Softening::ExponentialCrackOpening => range.mul_add(-libm::log(LEFT), LEFT * self.onset),
+        };
+        1.0 - LEFT * self.onset / strain
     }
 
     /// Strain and stress at which a damage was reached, where `active`; below the strain `high`.

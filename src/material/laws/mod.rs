@@ -162,6 +162,17 @@ materials! {
     Gas(flow::gas::Gas),
 }
 
+impl Parameters {
+    /// Whether particles of the material can fail: it has damage.
+    pub fn can_fail(&self) -> bool {
+        match self {
+            Self::Hencky(own) => own.damage.is_some(),
+            Self::VonMises(own) => own.damage.is_some(),
+            _ => false,
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

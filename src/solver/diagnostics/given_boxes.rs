@@ -96,6 +96,7 @@ impl<const D: usize> GivenBoxes<D> {
             root_edge,
             graded: forest.is_balanced(comm),
             materials: vec![material::build(&parameters::Parameters::NeoHookean(elastic), 1.0)],
+            failed: Vec::new(),
             stage_starts: vec![0.0],
             gravity: Gravity::constant([0.0; D]),
             loads: Vec::new(),

@@ -90,8 +90,8 @@ pub(in crate::solver) struct Gone {
     pub mass: f64,
     /// Its place, m from the lower corner of the domain; z is 0 in plane strain.
     pub place: [f64; 3],
-    /// The face that it is farthest beyond: axis and side.
-    pub face: (usize, usize),
+    /// The face that it is farthest beyond: axis and side; `None` of one in the domain.
+    pub face: Option<(usize, usize)>,
 }
 
 /// Particles of one leaf that crossed a face of the domain in one step.
@@ -103,6 +103,8 @@ pub(in crate::solver) struct Crossed {
     pub deleted: Vec<Gone>,
     /// Those that left through outflow faces.
     pub left: Vec<Gone>,
+    /// Those deleted in the domain, as they have failed.
+    pub failed: Vec<Gone>,
     /// Masses that passed openings, kg, with the number of the flux: negative against its normal.
     pub passed: Vec<(u32, f64)>,
 }
@@ -110,7 +112,8 @@ pub(in crate::solver) struct Crossed {
 impl Crossed {
     /// Whether there are any.
     pub(crate) fn is_any(&self) -> bool {
-        self.put_back > 0 || !self.deleted.is_empty() || !self.left.is_empty() || !self.passed.is_empty()
+        let gone = [&self.deleted, &self.left, &self.failed];
+        self.put_back > 0 || gone.iter().any(|gone| !gone.is_empty()) || !self.passed.is_empty()
     }
 }
 
@@ -136,6 +139,7 @@ impl Crossings {
         self.deleted += crossed.deleted.len() as u64;
         self.left += crossed.left.len() as u64;
         self.fluxes.book_passed(&crossed.passed);
+        crossed.failed.iter().for_each(|gone| self.fluxes.book(gone));
         for (sum, gone) in self.masses.iter_mut().zip([&crossed.deleted, &crossed.left]) {
             for gone in gone {
                 sum.add(gone.mass);
@@ -213,7 +217,7 @@ mod tests {
 
     #[test]
     fn the_line_says_what_there_is() {
-        let gone = Gone { mass: 0.5, place: [0.0; 3], face: (0, 0) };
+        let gone = Gone { mass: 0.5, place: [0.0; 3], face: Some((0, 0)) };
         let mut crossings = Crossings::default();
         assert_eq!(crossings.to_string(), "");
         crossings.book(&Crossed { put_back: 2, left: vec![gone; 1200], ..Crossed::default() });

@@ -26,6 +26,8 @@ pub(in crate::solver) enum Destination {
     Deleted,
     /// Out of the domain through an outflow face, and is removed.
     Left,
+    /// Nowhere: it has failed, and is deleted.
+    Failed,
     /// Nowhere itself; its children have destinations of their own.
     Split,
 }
@@ -102,6 +104,10 @@ impl<const D: usize> Borders<D> {
             }
             Destination::Deleted => departed.crossed.deleted.push(self.gone(chunk, p)),
             Destination::Left => departed.crossed.left.push(self.gone(chunk, p)),
+            Destination::Failed => {
+                let face = None;
+                departed.crossed.failed.push(Gone { face, ..self.gone(chunk, p) });
+            }
             Destination::Stay | Destination::Split => {}
         }
     }
@@ -112,7 +118,7 @@ impl<const D: usize> Borders<D> {
         let mut place = [0.0; 3];
         place[..D].copy_from_slice(&position);
         let (face, _) = farthest_beyond(&position, &self.extent);
-        Gone { mass: chunk.column(Layout::<D>::MASS)[p], place, face }
+        Gone { mass: chunk.column(Layout::<D>::MASS)[p], place, face: Some(face) }
     }
 
     /// Where a position is, if it is in another leaf than own leaf `leaf`.
@@ -127,20 +133,22 @@ impl<const D: usize> Borders<D> {
     }
 
     /// Not collective. Takes out of an own leaf the particles `outside` its box (ascending) that belong to
-    /// another or to none. With `resampling`, particles that enter a leaf finer than they were made for
-    /// become their children, each with a destination of its own; children that stay come last in the leaf.
+    /// another or to none, and those that have `failed` (ascending). With `resampling`, particles that enter
+    /// a leaf finer than they were made for become their children, each with a destination of its own;
+    /// children that stay come last in the leaf.
     pub(in crate::solver) fn depart(
         &self,
         tree: &KnownTree<D>,
         leaf: usize,
         chunk: &mut Chunk<D>,
-        outside: &[u32],
+        (outside, failed): (&[u32], &[u32]),
         resampling: Option<&Resampling<'_, D>>,
     ) -> Departed {
-        if outside.is_empty() {
+        if outside.is_empty() && failed.is_empty() {
             return Departed::default();
         }
-        let departed = self.take_out(tree, tree.first_own() + leaf, chunk, outside, resampling);
+        let leaf = tree.first_own() + leaf;
+        let departed = self.take_out(tree, leaf, chunk, (outside, failed), resampling);
         departed.unwrap_or_else(|error| Departed { error: Some(error), ..Departed::default() })
     }
 
@@ -150,12 +158,17 @@ impl<const D: usize> Borders<D> {
         tree: &KnownTree<D>,
         leaf: usize,
         chunk: &mut Chunk<D>,
-        outside: &[u32],
+        (outside, failed): (&[u32], &[u32]),
         resampling: Option<&Resampling<'_, D>>,
     ) -> Result<Departed, MigrateError> {
         let mut put_back = 0;
-        let mut leavers = self.destinations(tree, leaf, chunk, outside.iter().copied(), &mut put_back)?;
+        let whole = outside.iter().copied().filter(|p| failed.binary_search(p).is_err());
+        let mut leavers = self.destinations(tree, leaf, chunk, whole, &mut put_back)?;
         leavers.retain(|(_, destination)| !matches!(destination, Destination::Stay));
+        if !failed.is_empty() {
+            leavers.extend(failed.iter().map(|&p| (p, Destination::Failed)));
+            leavers.sort_unstable_by_key(|&(p, _)| p);
+        }
         let parents = resampling.map(|resampling| too_coarse(tree, chunk, resampling, &mut leavers));
         let parents = parents.unwrap_or_default();
         let mut children = chunk.gathered(&parents);

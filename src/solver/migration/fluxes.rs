@@ -24,12 +24,12 @@ impl Fluxes {
         Self { sections, sums: vec![ExactSum::new(); fluxes.len()] }
     }
 
-    /// Counts a particle that leaves the domain.
+    /// Counts a particle that leaves the domain, or is deleted in it: beyond a section, it has passed it.
     pub(super) fn book(&mut self, gone: &Gone) {
         for (section, sum) in self.sections.iter().zip(&mut self.sums) {
             let is_beyond = match section {
                 Section::Plane { .. } | Section::Opening { .. } => section.is_beyond(&gone.place),
-                Section::Face { axis, side } => (*axis, *side) == gone.face,
+                Section::Face { axis, side } => Some((*axis, *side)) == gone.face,
             };
             if is_beyond {
                 sum.add(gone.mass);

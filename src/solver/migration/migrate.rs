@@ -116,7 +116,7 @@ impl<const D: usize> Migration<D> {
         let leaves = chunks.par_iter_mut().enumerate().with_min_len(4);
         let departed = leaves.filter(|(leaf, _)| may_stray(*leaf)).map(|(leaf, chunk)| {
             let outside = outside(chunk, borders.of_leaf(leaf));
-            borders.depart(tree, leaf, chunk, &outside, resampling)
+            borders.depart(tree, leaf, chunk, (&outside, &[]), resampling)
         });
         let departed = departed.collect();
         self.arrive(tree, chunks, departed, splits, crossings)

@@ -97,6 +97,12 @@ pub const LOAD_SUMS: usize = 4;
 /// Sums of a source since the start: mass (kg), three components of momentum (kg m/s), kinetic energy (J).
 pub const SOURCE_SUMS: usize = 5;
 
+/// Sums over particles that have failed and gone since the start: number of those deleted and of those that
+/// have become another material; mass (kg), three components of momentum (kg m/s) and kinetic energy (J) of
+/// those deleted; elastic energy (J) that has gone with both; gravitational energy and plastic work (J) of
+/// those deleted.
+pub const FAILED_SUMS: usize = 10;
+
 /// Impulse and work of a source on a particle in its shape in one step, which keep the velocity of the
 /// particle.
 #[derive(Clone, Copy, Debug)]

@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use crate::adaptivity::LeafMaxima;
 use crate::particle::Chunk;
 use crate::particle::chunk::Place;
-use crate::solver::state::bookings::Struck;
+use crate::solver::state::bookings::{FAILED_SUMS, Struck};
 use crate::solver::state::phases::thread_time;
 
 /// Steps between measurements of time in a leaf; neighbours along the curve have theirs in different steps.
@@ -24,6 +24,8 @@ pub struct LeafData<const D: usize> {
     pub(in crate::solver) shifts: Vec<[f64; D]>,
     /// What particles gave to faces of the domain in the last step.
     pub(in crate::solver) struck: Vec<Vec<Struck<D>>>,
+    /// What particles that failed in the last step contribute to sums.
+    pub(in crate::solver) failed: Vec<Vec<[f64; FAILED_SUMS]>>,
     /// Where the particles were in memory at the start of the last G2P.
     pub(in crate::solver) places: Vec<Place>,
     /// Processor time of the particles' work.
@@ -38,6 +40,7 @@ impl<const D: usize> LeafData<D> {
         self.maxima.clear();
         self.shifts.clear();
         self.struck.clear();
+        self.failed.clear();
         self.places.clear();
         self.times.reset(leaves);
     }
@@ -59,6 +62,8 @@ impl<const D: usize> LeafData<D> {
         self.shifts.resize(chunks.len(), [0.0; D]);
         self.struck.iter_mut().for_each(Vec::clear);
         self.struck.resize_with(chunks.len(), Vec::new);
+        self.failed.iter_mut().for_each(Vec::clear);
+        self.failed.resize_with(chunks.len(), Vec::new);
         self.places.clear();
         self.places.extend(chunks.iter().map(Chunk::place));
     }

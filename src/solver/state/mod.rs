@@ -26,7 +26,7 @@ use crate::probe::{Maxima, Tracked};
 use crate::quantity::NotFinite;
 use crate::solver::physics::Physics;
 use crate::solver::state::bookings::{
-    Contacts, ExactSums, FACE_SUMS, LOAD_SUMS, Near, ParticlePush, SOURCE_SUMS, SourcePush,
+    Contacts, ExactSums, FACE_SUMS, FAILED_SUMS, LOAD_SUMS, Near, ParticlePush, SOURCE_SUMS, SourcePush,
 };
 use crate::solver::state::cost::Costs;
 use crate::solver::state::last_partition::LastPartition;
@@ -144,6 +144,8 @@ pub struct Solver<const D: usize> {
     pub shift_sums: ExactSums<1>,
     /// Mass, momentum and kinetic energy that sources have added since the start.
     pub source_sums: ExactSums<SOURCE_SUMS>,
+    /// Particles that have failed and gone since the start, with what went with them; none where none can.
+    pub failed_sums: ExactSums<FAILED_SUMS>,
     /// Mass, momentum and energy of the water that has come into pores since the start; none where ground
     /// weighs the same with and without it.
     pub pore_sums: ExactSums<SOURCE_SUMS>,

@@ -26,12 +26,13 @@ use crate::solver::sorting::bins::{BinLists, OfLeaf};
 use crate::solver::sorting::box_bounds::Widths;
 use crate::solver::sorting::leaf_bins::{self, LeafBins};
 use crate::solver::state::Solver;
-use crate::solver::state::bookings::{Near, ParticlePush, SourcePush, Struck};
+use crate::solver::state::bookings::{FAILED_SUMS, Near, ParticlePush, SourcePush, Struck};
 use crate::solver::state::grid::{Grid, VelocityField};
 use crate::solver::state::leaf_data::LeafData;
 use crate::solver::state::phases::Phase;
 use crate::solver::step::carried::{add_ways, follow, has_followers, note_ways, positions, strain};
 use crate::solver::step::contact::guard::Guard;
+use crate::solver::step::failed::{Failures, Found};
 use crate::solver::step::fill::means::MeanVolumes;
 use crate::solver::step::look::Look;
 use crate::solver::step::mean_dilation::MeanDilation;
@@ -115,6 +116,8 @@ struct Sweep<'a, const D: usize> {
     tensors: Vec<usize>,
     /// Sources that convey, with their numbers in the job.
     conveyors: Conveyors<'a, D>,
+    /// Failed particles that go, if there are any.
+    failures: Option<Failures<'a, D>>,
     /// Openings at which mass is counted, with their numbers.
     openings: Vec<(u32, Section)>,
     /// Flow of each material, and fill of the nodes, in jobs with fluids.
@@ -155,6 +158,7 @@ struct Notes<'a, const D: usize> {
     /// Mass times shift, kg m.
     shift: &'a mut [f64; D],
     struck: &'a mut Vec<Struck<D>>,
+    failed: &'a mut Vec<[f64; FAILED_SUMS]>,
 }
 
 impl<const D: usize> Solver<D> {
@@ -181,7 +185,7 @@ impl<const D: usize> Solver<D> {
         let following = self.physics.loads.iter().filter_map(Load::carried);
         let following: Vec<&Carried<D>> = following.filter(|carried| carried.follows()).collect();
         let flows = self.physics.flows(self.clock.time, dt);
-        let LeafData { signal, maxima, shifts, struck, places, times } = &mut self.leaf_data;
+        let LeafData { signal, maxima, shifts, struck, failed, places, times } = &mut self.leaf_data;
         let has_increments = scheme.transfer.has_increments();
         let Grid { plan, fields, arenas, increments, others, lists, migration, fill, .. } = &mut self.grid;
         let sweep = Sweep {
@@ -202,6 +206,7 @@ impl<const D: usize> Solver<D> {
             displacement: self.physics.followed_columns().displacement,
             tensors: self.physics.tensor_columns(),
             conveyors: conveyors(&self.physics, self.clock.time),
+            failures: Failures::new(&self.physics, to - 0.5 * dt),
             openings: self.crossings.fluxes.openings(),
             fill: fill.as_ref().filter(|_| !flows.is_empty()).map(|fill| &fill.of_nodes[..]),
             flows,
@@ -210,19 +215,21 @@ impl<const D: usize> Solver<D> {
         let (near, conveyed) = (&mut self.near, &mut self.conveyed);
         let departed = self.phases.time(Phase::Gather, || {
             let leaves = chunks.par_iter_mut().zip(lists.by_leaf()).zip(maxima).zip(signal);
-            let leaves = leaves.zip(pushes).zip(near).zip(&mut *shifts).zip(conveyed).zip(struck);
+            let leaves = leaves.zip(pushes).zip(near).zip(&mut *shifts).zip(conveyed).zip(struck).zip(failed);
             let departed = leaves.enumerate().map_init(Scratch::default, |scratch, (leaf, notes)| {
+                let (notes, failed) = notes;
                 let ((((((((chunk, bins), maxima), signal), pushes), near), shift), conveyed), struck) =
                     notes;
                 // There may be very many empty leaves, and measuring the time costs more than their work.
                 let is_empty = chunk.is_empty();
-                let notes = Notes { maxima, signal, pushes, near, conveyed, shift, struck };
+                let notes = Notes { maxima, signal, pushes, near, conveyed, shift, struck, failed };
                 let advance = || sweep.advance_leaf(scratch, leaf, chunk, bins, notes);
                 if is_empty { advance() } else { times.time(leaf, advance) }
             });
             departed.filter(Departed::is_any).collect()
         });
         self.book_struck();
+        self.book_failed();
         if !self.shift_sums.of.is_empty() {
             let shifts = std::mem::take(&mut self.leaf_data.shifts);
             self.book_shifts(&shifts, to - 0.5 * dt);
@@ -286,7 +293,7 @@ impl<const D: usize> Sweep<'_, D> {
         bins: OfLeaf<'_, D>,
         notes: Notes<'_, D>,
     ) -> Departed {
-        let Notes { maxima, signal, pushes, near, conveyed, shift, struck } = notes;
+        let Notes { maxima, signal, pushes, near, conveyed, shift, struck, failed } = notes;
         let is_empty = chunk.is_empty();
         self.watch.before(chunk, maxima);
         let aabb = self.borders.of_leaf(leaf);
@@ -332,8 +339,12 @@ impl<const D: usize> Sweep<'_, D> {
         {
             return Departed { error: Some(error), ..Departed::default() };
         }
+        let found = self.failures.as_ref().map(|failures| failures.find(chunk)).unwrap_or_default();
+        let Found { deleted, sums, signal: changed } = found;
+        (*failed, *signal) = (sums, signal.max(changed));
         let leavers = &scratch.leavers.found;
-        let mut departed = self.borders.depart(&self.plan.tree, leaf, chunk, leavers, self.resampling);
+        let gone = (&leavers[..], &deleted[..]);
+        let mut departed = self.borders.depart(&self.plan.tree, leaf, chunk, gone, self.resampling);
         departed.crossed.passed = passed;
         if !is_empty && self.others.is_empty() {
             bins.presort(self.plan, leaf, chunk, self.widths, &mut scratch.sort);

@@ -18,6 +18,7 @@
 //! | [`between`] | contact between bodies |
 //! | `saturation` | pores fill with water: masses of particles |
 //! | [`relax`] | kinetic damping, on the way to equilibrium |
+//! | `failed` | particles whose material has failed |
 //! | `sources` | material that enters during the run |
 //! | `ties` | surface nodes that move with the material beside them |
 //! | [`loads`] | loads: their effect on nodes, impulse and work |
@@ -27,6 +28,7 @@ pub mod carried;
 pub mod colliders;
 mod contact;
 pub mod exchange;
+mod failed;
 mod fill;
 mod flip_xpic;
 pub mod g2p;
