@@ -3,8 +3,8 @@
 //! A million particles in blocks of their own, so that columns come from memory as in a run; eight
 //! per cell in 3D, four in 2D. Plastic materials flow in every step. Blocks beside level jumps hold some of
 //! their leaf's particles, whose stencils touch constrained nodes.
+use agimp::kernel::booked::Booked;
 use agimp::kernel::constrained_nodes::ConstrainedNodes;
-use agimp::kernel::fill::Shifted;
 use agimp::kernel::hanging::HangingNodes;
 use agimp::kernel::leavers::Leavers;
 use agimp::kernel::{BoxPolicy, Frame, Row, Scheme, Select, Transfer, arena_nodes, g2p, p2g};
@@ -136,7 +136,7 @@ fn gather<const D: usize>(bencher: Bencher, model: Model, distinct: usize) {
                 leavers,
                 dilation: &[],
                 filling: None,
-                shifted: &mut Shifted::default(),
+                booked: &mut Booked::default(),
             };
             greatest.max(bin.whole_boxes(Select::All, Place::default()))
         })
@@ -202,7 +202,7 @@ fn g2p_3d_level_mix(bencher: Bencher, (quarters, jump): (u32, bool)) {
                 leavers,
                 dilation: &[],
                 filling: None,
-                shifted: &mut Shifted::default(),
+                booked: &mut Booked::default(),
             };
             greatest.max(bin.whole_boxes(Select::List(&list), Place::default()))
         })

@@ -19,6 +19,7 @@
 //! Shares of a step are those of implicit relaxation, `r_α = y/(1 + y)` with `y = α c Δt / h` and c the speed
 //! of sound. `docs/design/fluid-volume.md` says what each part does, and what else was tried.
 use super::batch::Batch;
+use super::booked::{self, Booked};
 use super::gathered::Sums;
 use crate::material::Symmetric;
 use crate::material::eigen::determinant;
@@ -32,7 +33,7 @@ const SHIFT: f64 = 0.15;
 const FARTHEST: f64 = 0.05;
 /// Rate β towards the mean of a cell, in speeds of sound over cells.
 const MEAN: f64 = 0.05;
-/// Least distance from a wall to which particles are shifted, as a share of a cell.
+/// Least distance from a wall to which particles are booked, as a share of a cell.
 const CLOSEST: f64 = 1e-9;
 
 /// A material in a step.
@@ -59,23 +60,6 @@ pub struct Filling<'a> {
     pub flows: &'a [Flow],
     /// By particle of the chunk, the mean J̄ of the fluid in its cell; 1 for what is no fluid.
     pub means: &'a [f64],
-}
-
-/// Sums of mass times shift over particles, kg m, lane by lane.
-#[derive(Clone, Copy, Debug)]
-pub struct Shifted<const D: usize>([[f64; LANES]; D]);
-
-impl<const D: usize> Default for Shifted<D> {
-    fn default() -> Self {
-        Self([[0.0; LANES]; D])
-    }
-}
-
-impl<const D: usize> Shifted<D> {
-    /// The sums over all lanes.
-    pub fn total(&self) -> [f64; D] {
-        self.0.map(|lanes| lanes.iter().sum())
-    }
 }
 
 /// A batch with the sums that it gathered.
@@ -154,7 +138,7 @@ impl<V: Vector, const D: usize> Filled<V, D> {
         tile: &[[f64; LANES]],
         moved: &mut [V; D],
         extent: Option<&[f64; D]>,
-        shifted: &mut Shifted<D>,
+        booked: &mut Booked<D>,
     ) {
         let (zero, one) = (V::splat(0.0), V::splat(1.0));
         let excess = self.fill - one;
@@ -172,9 +156,7 @@ impl<V: Vector, const D: usize> Filled<V, D> {
                 let upper = V::splat(extent[axis]) - lower;
                 to = to.max(lower.min(moved[axis])).min(upper.max(moved[axis]));
             }
-            let sum = &mut shifted.0[axis];
-            let gone = batch.of_members(mass * (to - moved[axis]));
-            (V::load(sum) + gone).store(sum);
+            booked::add(&mut booked.ways[axis], batch.of_members(mass * (to - moved[axis])));
             moved[axis] = to;
         }
     }

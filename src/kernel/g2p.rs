@@ -13,8 +13,9 @@
 //! of the velocity over the box. So the radius grows at the rate `r L_θθ`: the stretch along the hoop is the
 //! ratio of the radii, whatever the motion.
 use super::batch::{Batch, Batches, Tile};
+use super::booked::{self, Booked};
 use super::domain::AtWall;
-use super::fill::{Filling, Shifted};
+use super::fill::Filling;
 pub use super::gathered::{FILL_MORE, Fields, Gathered, Moments};
 use super::gathered::{Sums, mean};
 use super::leavers::Leavers;
@@ -61,7 +62,7 @@ pub struct Gather<'a, const D: usize> {
     /// Data that keep fluids at their volume, in jobs with fluids; `fields` then has how full nodes are.
     pub filling: Option<&'a Filling<'a>>,
     /// Sum of the shifts that this gives to particles.
-    pub shifted: &'a mut Shifted<D>,
+    pub booked: &'a mut Booked<D>,
 }
 
 impl<const D: usize> Gather<'_, D> {
@@ -97,7 +98,7 @@ impl<const D: usize> Kernel for WholeBoxes<'_, D> {
 impl<const D: usize> WholeBoxes<'_, D> {
     #[inline(always)]
     fn advance_all<V: Vector, const AT_WALL: bool>(self) -> f64 {
-        let Gather { scratch, chunk, frame, scheme, dt, fields, leavers, dilation, filling, shifted } =
+        let Gather { scratch, chunk, frame, scheme, dt, fields, leavers, dilation, filling, booked } =
             self.bin;
         let batches = Batches::new(self.select, chunk, self.next);
         let (tiles, tags) = chunk.tiles_mut_and_tags();
@@ -120,7 +121,7 @@ impl<const D: usize> WholeBoxes<'_, D> {
             }
             sums.gather::<V>(weights, nodes, &batch, cell, fields);
             let update = Advance { scheme, dt, cell, dilation, filling };
-            let speed = update.batch(tile, tags, &batch, &position, sums, wall, (leavers, shifted));
+            let speed = update.batch(tile, tags, &batch, &position, sums, wall, (leavers, booked));
             greatest = speed.max(greatest);
             batch.put_back::<D>(tiles, spare);
         }
@@ -164,7 +165,7 @@ pub fn advance_gathered<const D: usize>(
     gathered: &[Gathered<D>],
     update: &Advance,
     extent: &[f64; D],
-    (leavers, shifted): (&mut Leavers<D>, &mut Shifted<D>),
+    (leavers, booked): (&mut Leavers<D>, &mut Booked<D>),
 ) -> f64 {
     let &Advance { scheme, cell, .. } = update;
     let (tiles, tags) = chunk.tiles_mut_and_tags();
@@ -180,7 +181,7 @@ pub fn advance_gathered<const D: usize>(
         let whole = domain::whole_of_batch(tile, tags, &batch, f64::INFINITY, scheme);
         let half = domain::cut_at_walls(&whole, &position, cell, extent);
         let wall = Some(AtWall { whole, half, cell, extent });
-        let speed = update.batch(tile, tags, &batch, &position, sums, wall, (leavers, shifted));
+        let speed = update.batch(tile, tags, &batch, &position, sums, wall, (leavers, booked));
         greatest = speed.max(greatest);
         batch.put_back::<D>(tiles, spare);
     }
@@ -270,7 +271,7 @@ impl Advance<'_> {
         position: &[V; D],
         sums: &Sums<D>,
         wall: Option<AtWall<V, D>>,
-        (leavers, shifted): (&mut Leavers<D>, &mut Shifted<D>),
+        (leavers, booked): (&mut Leavers<D>, &mut Booked<D>),
     ) -> V {
         let &Self { scheme, dt, cell, dilation, filling } = self;
         let zero = V::splat(0.0);
@@ -313,7 +314,7 @@ impl Advance<'_> {
             None => None,
         };
         if let Some(filled) = &filled {
-            filled.shift(batch, tile, &mut moved, wall.map(|wall| wall.extent), shifted);
+            filled.shift(batch, tile, &mut moved, wall.map(|wall| wall.extent), booked);
         }
         for i in 0..D {
             batch.store(tile, Layout::<D>::POSITION + i, moved[i]);
@@ -396,7 +397,14 @@ impl Advance<'_> {
                 }
             }
         }
-        if plastic || scheme.viscosity.is_some() {
+        if scheme.viscosity.is_some() {
+            let width = batch.load::<V>(tile, Layout::<D>::HALF) * 2.0;
+            let volume = (1..D).fold(width, |volume, _| volume * width);
+            for (sum, work) in booked.shocks.iter_mut().zip(&state.shock) {
+                booked::add(sum, batch.of_members(result(work) * volume));
+            }
+        }
+        if plastic {
             let work = batch.load::<V>(tile, Layout::<D>::WORK) + result(&state.work);
             batch.store(tile, Layout::<D>::WORK, work);
             sum += work;

@@ -11,6 +11,7 @@ use crate::particle::chunk::Tag;
 use crate::simd::{F64x4, LANES, Lanes, Vector};
 
 mod batch;
+pub mod booked;
 pub mod constrained_nodes;
 pub mod domain;
 pub mod fill;

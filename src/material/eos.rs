@@ -233,7 +233,7 @@ impl Law for Shocked {
     }
 
     #[inline(always)]
-    fn take_heat<V: Vector>(&self, state: &mut State<V>, heat: V) {
+    fn take_heat<V: Vector>(&self, state: &mut State<V>, heat: V) -> V {
         let ratio = determinant(&state.elastic).sqrt();
         let scale = self.to_reference(V::splat(1.0) - ratio);
         state.history[HEAT] = heat.mul_add(scale, state.history[HEAT]);
@@ -243,6 +243,7 @@ impl Law for Shocked {
         for normal in &mut state.stress[..3] {
             *normal = *normal - more;
         }
+        heat
     }
 
     fn density(&self) -> f64 {

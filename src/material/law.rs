@@ -2,7 +2,7 @@
 //! that the solver calls ([`Material`]).
 use super::initial::Consolidation;
 use super::laws::hencky::Hencky;
-use super::shock::Shock;
+use super::shock::{SHOCK_SUMS, Shock};
 use super::tangent::{self, Tangent};
 use super::tensor::eigen::Symmetric;
 use super::{HISTORIES, PLASTIC_STRAIN};
@@ -22,13 +22,23 @@ pub struct State<V = Lanes> {
     pub work: V,
     /// Upper bound of the wave speeds after an update, m/s.
     pub wave_speed: V,
+    /// Work of artificial viscosity in the update per reference volume and the part of it that is heat of the
+    /// material, J/m³; written only with such viscosity.
+    pub shock: [V; SHOCK_SUMS],
 }
 
 impl<V: Vector> State<V> {
     /// A batch at rest with `elastic` as trial value and no history.
     pub fn new(elastic: Symmetric<V>) -> Self {
         let zero = V::splat(0.0);
-        Self { elastic, stress: [zero; 6], history: [zero; HISTORIES], work: zero, wave_speed: zero }
+        Self {
+            elastic,
+            stress: [zero; 6],
+            history: [zero; HISTORIES],
+            work: zero,
+            wave_speed: zero,
+            shock: [zero; SHOCK_SUMS],
+        }
     }
 }
 
@@ -53,7 +63,7 @@ impl State {
 
     /// Takes over the registers of a kernel.
     #[inline(always)]
-    fn write<V: Vector>(&mut self, state: &State<V>, histories: usize) {
+    fn write<V: Vector>(&mut self, state: &State<V>, histories: usize, shock: bool) {
         for c in 0..6 {
             state.elastic[c].store(self.elastic[c].as_array_mut());
             state.stress[c].store(self.stress[c].as_array_mut());
@@ -65,6 +75,11 @@ impl State {
         }
         state.work.store(self.work.as_array_mut());
         state.wave_speed.store(self.wave_speed.as_array_mut());
+        if shock {
+            for (own, work) in self.shock.iter_mut().zip(&state.shock) {
+                work.store(own.as_array_mut());
+            }
+        }
     }
 }
 
@@ -105,11 +120,11 @@ pub trait Law: std::fmt::Debug + Send + Sync {
     /// See [`Material::energy`]. To be marked `inline(always)`.
     fn energy<V: Vector>(&self, state: &State<V>, plane: bool) -> V;
 
-    /// Takes up heat (J/m³, per reference volume) after an update: that of artificial viscosity. By default it
-    /// counts as plastic work. To be marked `inline(always)`.
+    /// Takes up heat (J/m³, per reference volume) after an update: that of artificial viscosity. Returns the
+    /// part that its energy has then; by default none. To be marked `inline(always)`.
     #[inline(always)]
-    fn take_heat<V: Vector>(&self, state: &mut State<V>, heat: V) {
-        state.work += heat;
+    fn take_heat<V: Vector>(&self, _state: &mut State<V>, _heat: V) -> V {
+        V::splat(0.0)
     }
 
     /// All of an update: [`Law::respond`] and artificial viscosity.
@@ -364,6 +379,6 @@ impl<L: Law> Kernel for Response<'_, L> {
         let Self(law, state, step) = self;
         let mut own = state.read::<V>(L::HISTORIES);
         law.advance(&mut own, step);
-        state.write(&own, L::HISTORIES);
+        state.write(&own, L::HISTORIES, step.shock.is_some());
     }
 }

@@ -43,7 +43,7 @@ pub mod undrained;
 pub use law::{Law, Material, State, Step};
 pub use laws::{HISTORIES, Model};
 pub use parameters::Parameters;
-pub use shock::{Shock, Viscosity};
+pub use shock::{SHOCK_SUMS, Shock, Viscosity};
 pub use tangent::Tangent;
 pub use tensor::eigen::{self, Symmetric};
 
@@ -96,6 +96,9 @@ pub fn update(materials: &[Box<dyn Material>], index: &[u16; LANES], state: &mut
         }
         state.work = mask.select(part.work, state.work);
         state.wave_speed = mask.select(part.wave_speed, state.wave_speed);
+        for (own, work) in state.shock.iter_mut().zip(part.shock) {
+            *own = mask.select(work, *own);
+        }
         pending &= !bits;
     }
 }

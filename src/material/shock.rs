@@ -12,6 +12,9 @@ use crate::simd::{LANES, Vector, VectorMask};
 
 use super::{Law, State, Step};
 
+/// Numbers booked of it: work, and the part of it that is heat of the material.
+pub const SHOCK_SUMS: usize = 2;
+
 /// Coefficients of artificial viscosity.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Viscosity {
@@ -19,6 +22,15 @@ pub struct Viscosity {
     pub linear: f64,
     /// `a_2`, of the difference of velocity over a cell.
     pub quadratic: f64,
+}
+
+impl Viscosity {
+    /// Speed of waves that bounds the step where they have the speed `wave` without viscosity and the
+    /// difference of velocity over a cell is `jump`, m/s.
+    pub fn bound(&self, wave: f64, jump: f64) -> f64 {
+        let damping = self.linear * wave + 2.0 * self.quadratic * jump;
+        damping + damping.hypot(wave)
+    }
 }
 
 /// Artificial viscosity in an update.
@@ -43,7 +55,8 @@ impl Shock {
         let Viscosity { linear, quadratic } = self.viscosity;
         let jump = closing.max(zero) * step.cell;
         let pressure = jump * (jump * quadratic + state.wave_speed * linear) * law.density();
-        law.take_heat(state, pressure * closing.max(zero) * step.dt);
+        let work = pressure * closing.max(zero) * step.dt;
+        state.shock = [work, law.take_heat(state, work)];
         for normal in &mut state.stress[..3] {
             *normal = *normal - pressure;
         }

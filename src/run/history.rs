@@ -43,9 +43,9 @@ const COLUMNS: [Column<'static>; 20] = [
 ];
 
 /// Names and units of the columns after the step. Parts of a job add their own in this order: splits and
-/// merges of dynamic refinement; the work of the shift of fluids; the progress towards equilibrium; the
-/// number of the stage, from 1; sources; failed particles; water in the pores; loads; contacts between bodies; probes; tracks; fluxes; faces of the
-/// domain; colliders.
+/// merges of dynamic refinement; the work of the shift of fluids; work and heat of artificial viscosity; the
+/// progress towards equilibrium; the number of the stage, from 1; sources; failed particles; water in the
+/// pores; loads; contacts between bodies; probes; tracks; fluxes; faces of the domain; colliders.
 pub fn columns<const D: usize>(problem: &Problem<D>) -> Vec<(String, &'static str)> {
     let mut columns: Vec<(String, &'static str)> =
         COLUMNS.iter().map(|column| (column.name.to_owned(), column.unit)).collect();
@@ -54,6 +54,9 @@ pub fn columns<const D: usize>(problem: &Problem<D>) -> Vec<(String, &'static st
     }
     if setup::physics(problem).has_fluids() {
         columns.push(("shift_work".to_owned(), "J"));
+    }
+    if problem.viscosity.is_some() {
+        columns.extend(["viscous_work", "viscous_heat"].map(|name| (name.to_owned(), "J")));
     }
     if problem.has_equilibrium() {
         columns.extend(RELAXATION.map(|(name, unit)| (name.to_owned(), unit)));

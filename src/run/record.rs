@@ -263,7 +263,7 @@ impl<'a, const D: usize> Recorder<'a, D> {
         let faces = solver.face_forces();
         let crossings = solver.crossings.gather(comm);
         let ledger = solver.physics.adaptivity.as_ref().map(|_| solver.ledger.total(comm));
-        let shift_work = solver.shift_work();
+        let (shift_work, shock_work) = (solver.shift_work(), solver.shock_work());
         if self.history.is_none() {
             return (Vec::new(), samples);
         }
@@ -278,6 +278,7 @@ impl<'a, const D: usize> Recorder<'a, D> {
             values.extend(history::ledger_values(ledger));
         }
         values.extend(shift_work);
+        values.extend(shock_work.into_iter().flatten());
         if self.problem.has_equilibrium() {
             let seeks = solver.physics.equilibrium.is_some();
             values.extend(

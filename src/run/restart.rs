@@ -107,6 +107,7 @@ pub fn scalars<const D: usize>(
     write_exact_sums("load", &solver.load_sums, comm, &mut reals, &mut exact);
     write_exact_sums("contact", &solver.body_sums, comm, &mut reals, &mut exact);
     write_exact_sums("shift", &solver.shift_sums, comm, &mut reals, &mut exact);
+    write_exact_sums("shock", &solver.shock_sums, comm, &mut reals, &mut exact);
     write_exact_sums("face", &solver.face_sums, comm, &mut reals, &mut exact);
     if solver.physics.equilibrium.is_some() {
         let Relaxation { kinetic, speed, acceleration, stops, phase } = solver.relaxation;
@@ -401,6 +402,7 @@ fn restored<const D: usize>(
     restore_exact_sums("shift", &mut solver.shift_sums, rank, scalars)
         .ok_or_else(|| refused("the work of the shift of fluids is missing"))?;
     // A run without them may have written the file: then they begin here.
+    let _ = restore_exact_sums("shock", &mut solver.shock_sums, rank, scalars);
     let _ = restore_exact_sums("face", &mut solver.face_sums, rank, scalars);
     restore_relaxation(&mut solver, scalars)
         .ok_or_else(|| refused("the state of the relaxation to equilibrium is missing"))?;

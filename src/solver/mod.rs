@@ -75,6 +75,7 @@ impl<const D: usize> Solver<D> {
             face_sums: ExactSums::new(if physics.face_forces { 2 * D } else { 0 }, clock.time),
             body_sums: ExactSums::new(physics.body_contacts.names.len(), clock.time),
             shift_sums: ExactSums::new(usize::from(physics.has_fluids()), clock.time),
+            shock_sums: ExactSums::new(usize::from(physics.viscosity.is_some()), clock.time),
             source_sums: ExactSums::new(physics.sources.len(), clock.time),
             failed_sums: ExactSums::new(usize::from(physics.can_fail()), clock.time),
             pore_sums: ExactSums::new(usize::from(physics.followed.saturation), clock.time),

@@ -64,7 +64,8 @@ fn mean(state: &[[f64; 4]], [from, to]: [f64; 2], value: usize) -> f64 {
 fn change_of_energy(history: &History, scale: f64) -> f64 {
     let of = |name: &str| history.column(name);
     let (kinetic, elastic, work) = (of("kinetic_energy"), of("elastic_energy"), of("plastic_work"));
-    let sum = |row: usize| kinetic[row] + elastic[row] + work[row];
+    let (viscous, heat) = (of("viscous_work"), of("viscous_heat"));
+    let sum = |row: usize| kinetic[row] + elastic[row] + work[row] + viscous[row] - heat[row];
     (0..kinetic.len()).map(|row| (sum(row) - sum(0)).abs() / scale).fold(0.0, f64::max)
 }
 

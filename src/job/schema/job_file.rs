@@ -489,8 +489,8 @@ pub struct Numerics {
 }
 
 /// Artificial viscosity: where material is compressed at the rate `d = -tr D > 0`, its pressure is greater by
-/// `density h d (quadratic h d + linear c)`, with cells of edge h and waves of speed c. Its work heats gas, and is plastic work in all other
-/// materials.
+/// `density h d (quadratic h d + linear c)`, with cells of edge h and waves of speed c. `viscous_work` of `history.csv` is its work since the start, J, and `viscous_heat`
+/// the part of it that is in `elastic_energy`: that in gas, in explosives that burn or have burned, and in metal with `eos`, which it heats.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ArtificialViscosity {

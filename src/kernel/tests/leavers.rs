@@ -24,7 +24,7 @@ fn leavers_are_found<const D: usize>() {
             leavers: &mut leavers,
             dilation: &[],
             filling: None,
-            shifted: &mut Shifted::default(),
+            booked: &mut Booked::default(),
         };
         bin.whole_boxes(select, Place::default());
         let moved: Vec<u32> = match select {

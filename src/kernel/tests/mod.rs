@@ -1,6 +1,6 @@
 //! Scatter and gather together, against a plain scalar definition.
+use super::booked::Booked;
 use super::constrained_nodes::{ConstrainedNodes, MomentNode};
-use super::fill::Shifted;
 use super::g2p::{Fields, Gathered, Moments};
 use super::hanging::HangingNodes;
 use super::leavers::Leavers;
@@ -34,7 +34,7 @@ fn gather<const D: usize>(
         leavers,
         dilation: &[],
         filling: None,
-        shifted: &mut Shifted::default(),
+        booked: &mut Booked::default(),
     }
     .whole_boxes(select, next)
 }

@@ -76,7 +76,7 @@ fn parts_equal_the_whole<const D: usize>() {
         &gathered,
         &g2p::Advance { scheme: &scheme, dt: DT, cell: CELL, dilation: &[], filling: None },
         &frame.extent,
-        (&mut Leavers::default(), &mut Shifted::default()),
+        (&mut Leavers::default(), &mut Booked::default()),
     );
     for column in 0..Layout::<D>::REALS {
         for (a, b) in whole.column(column).iter().zip(parted.column(column)) {
@@ -342,7 +342,7 @@ fn bits_do_not_depend_on_earlier_bins() {
                 leavers,
                 dilation: &[],
                 filling: None,
-                shifted: &mut Shifted::default(),
+                booked: &mut Booked::default(),
             }
             .whole_boxes(Select::All, place);
             arena

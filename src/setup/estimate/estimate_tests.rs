@@ -56,3 +56,26 @@ fn time_step_and_outputs() {
     assert_eq!(estimate.outputs, 2);
     assert_eq!(estimate.total_particles(), 2 * 64);
 }
+
+/// Bodies that meet with artificial viscosity: waves count as it damps them in the shock between the bodies.
+#[test]
+fn artificial_viscosity_shortens_the_step() {
+    let text = r#"
+version = 1
+dimension = 2
+domain = { size = [1, 1], root_edge = 1 }
+time = { end = 1 }
+numerics = { artificial_viscosity = { linear = 0.5, quadratic = 4 } }
+materials = [{ name = "m", density = 1000, model = "hencky", young = 1e6, poisson = 0.0 }]
+bodies = [
+    { name = "a", material = "m", velocity = [6, 0], shape = { kind = "box", min = [0, 0], max = [0.5, 0.5] } },
+    { name = "b", material = "m", velocity = [-3, 0], shape = { kind = "box", min = [0.5, 0], max = [1, 0.5] } },
+]
+"#;
+    let Ok(AnyProblem::Two(problem)) = parse(text, "job.toml".as_ref()) else { panic!("no job") };
+    let wave = 1000_f64.sqrt();
+    let damping = 0.5 * wave + 2.0 * 4.0 * 3.0;
+    let expected = 0.4 / 4.0 / (damping + damping.hypot(wave) + 6.0);
+    let step = estimate(&problem).unwrap().time_step;
+    assert!((step / expected - 1.0).abs() < 1e-12, "{step} {expected}");
+}

@@ -3,6 +3,7 @@ use std::ops::Range;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use crate::adaptivity::LeafMaxima;
+use crate::material::SHOCK_SUMS;
 use crate::particle::Chunk;
 use crate::particle::chunk::Place;
 use crate::solver::state::bookings::{FAILED_SUMS, Struck};
@@ -22,6 +23,8 @@ pub struct LeafData<const D: usize> {
     pub(in crate::solver) maxima: Vec<LeafMaxima<D>>,
     /// Mass times the shift that keeps fluids in their volume, summed over particles in the last step, kg m.
     pub(in crate::solver) shifts: Vec<[f64; D]>,
+    /// Work of artificial viscosity in the last step and the part of it that is heat of the material, J.
+    pub(in crate::solver) shocks: Vec<[f64; SHOCK_SUMS]>,
     /// What particles gave to faces of the domain in the last step.
     pub(in crate::solver) struck: Vec<Vec<Struck<D>>>,
     /// What particles that failed in the last step contribute to sums.
@@ -39,6 +42,7 @@ impl<const D: usize> LeafData<D> {
         self.signal.resize(leaves, 0.0);
         self.maxima.clear();
         self.shifts.clear();
+        self.shocks.clear();
         self.struck.clear();
         self.failed.clear();
         self.places.clear();
@@ -60,6 +64,7 @@ impl<const D: usize> LeafData<D> {
         self.signal.resize(chunks.len(), 0.0);
         self.maxima.resize(chunks.len(), LeafMaxima::default());
         self.shifts.resize(chunks.len(), [0.0; D]);
+        self.shocks.resize(chunks.len(), [0.0; SHOCK_SUMS]);
         self.struck.iter_mut().for_each(Vec::clear);
         self.struck.resize_with(chunks.len(), Vec::new);
         self.failed.iter_mut().for_each(Vec::clear);

@@ -21,6 +21,7 @@ use super::migration::migrate::{MigrateError, Moved};
 use super::sorting::bins::BinMissing;
 use crate::adaptivity::resample::ledger::Ledger;
 use crate::exact_sum::ExactSum;
+use crate::material::SHOCK_SUMS;
 use crate::particle::Chunk;
 use crate::probe::{Maxima, Tracked};
 use crate::quantity::NotFinite;
@@ -142,6 +143,9 @@ pub struct Solver<const D: usize> {
     pub body_sums: ExactSums<LOAD_SUMS>,
     /// Work of the shifts that keep fluids in their volume since the start, J; none without fluids.
     pub shift_sums: ExactSums<1>,
+    /// Work of artificial viscosity since the start and the part of it that is heat of the material, J; none
+    /// without.
+    pub shock_sums: ExactSums<SHOCK_SUMS>,
     /// Mass, momentum and kinetic energy that sources have added since the start.
     pub source_sums: ExactSums<SOURCE_SUMS>,
     /// Particles that have failed and gone since the start, with what went with them; none where none can.

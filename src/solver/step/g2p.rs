@@ -12,11 +12,13 @@ use crate::grid::arenas::Arenas;
 use crate::grid::leaf_geometry::LeafCells;
 use crate::grid::sums::node_fields::{VelocityArena, load_rows, load_values};
 use crate::grid::{GridPlan, NodeFields};
-use crate::kernel::fill::{Filling, Flow, Shifted};
+use crate::kernel::booked::Booked;
+use crate::kernel::fill::{Filling, Flow};
 use crate::kernel::g2p::{FILL_MORE, Fields, Gathered, Moments};
 use crate::kernel::leavers::Leavers;
 use crate::kernel::{Row, Scheme, arena_nodes, g2p};
 use crate::load::{Carried, Load};
+use crate::material::SHOCK_SUMS;
 use crate::particle::Chunk;
 use crate::particle::chunk::{Layout, Place};
 use crate::probe::Section;
@@ -53,7 +55,7 @@ struct Scratch<const D: usize> {
     gradients: Vec<(u32, [[f64; D]; D], f64)>,
     mean_dilation: MeanDilation,
     mean_volumes: MeanVolumes,
-    shifted: Shifted<D>,
+    booked: Booked<D>,
 }
 
 impl<const D: usize> Default for Scratch<D> {
@@ -69,7 +71,7 @@ impl<const D: usize> Default for Scratch<D> {
             gradients: Vec::new(),
             mean_dilation: MeanDilation::default(),
             mean_volumes: MeanVolumes::default(),
-            shifted: Shifted::default(),
+            booked: Booked::default(),
         }
     }
 }
@@ -157,6 +159,7 @@ struct Notes<'a, const D: usize> {
     conveyed: &'a mut Vec<SourcePush<D>>,
     /// Mass times shift, kg m.
     shift: &'a mut [f64; D],
+    shock: &'a mut [f64; SHOCK_SUMS],
     struck: &'a mut Vec<Struck<D>>,
     failed: &'a mut Vec<[f64; FAILED_SUMS]>,
 }
@@ -185,7 +188,7 @@ impl<const D: usize> Solver<D> {
         let following = self.physics.loads.iter().filter_map(Load::carried);
         let following: Vec<&Carried<D>> = following.filter(|carried| carried.follows()).collect();
         let flows = self.physics.flows(self.clock.time, dt);
-        let LeafData { signal, maxima, shifts, struck, failed, places, times } = &mut self.leaf_data;
+        let LeafData { signal, maxima, shifts, shocks, struck, failed, places, times } = &mut self.leaf_data;
         let has_increments = scheme.transfer.has_increments();
         let Grid { plan, fields, arenas, increments, others, lists, migration, fill, .. } = &mut self.grid;
         let sweep = Sweep {
@@ -215,14 +218,21 @@ impl<const D: usize> Solver<D> {
         let (near, conveyed) = (&mut self.near, &mut self.conveyed);
         let departed = self.phases.time(Phase::Gather, || {
             let leaves = chunks.par_iter_mut().zip(lists.by_leaf()).zip(maxima).zip(signal);
-            let leaves = leaves.zip(pushes).zip(near).zip(&mut *shifts).zip(conveyed).zip(struck).zip(failed);
+            let leaves = leaves
+                .zip(pushes)
+                .zip(near)
+                .zip(&mut *shifts)
+                .zip(conveyed)
+                .zip(struck)
+                .zip(failed)
+                .zip(shocks);
             let departed = leaves.enumerate().map_init(Scratch::default, |scratch, (leaf, notes)| {
-                let (notes, failed) = notes;
+                let ((notes, failed), shock) = notes;
                 let ((((((((chunk, bins), maxima), signal), pushes), near), shift), conveyed), struck) =
                     notes;
                 // There may be very many empty leaves, and measuring the time costs more than their work.
                 let is_empty = chunk.is_empty();
-                let notes = Notes { maxima, signal, pushes, near, conveyed, shift, struck, failed };
+                let notes = Notes { maxima, signal, pushes, near, conveyed, shift, shock, struck, failed };
                 let advance = || sweep.advance_leaf(scratch, leaf, chunk, bins, notes);
                 if is_empty { advance() } else { times.time(leaf, advance) }
             });
@@ -230,6 +240,7 @@ impl<const D: usize> Solver<D> {
         });
         self.book_struck();
         self.book_failed();
+        self.book_shocks();
         if !self.shift_sums.of.is_empty() {
             let shifts = std::mem::take(&mut self.leaf_data.shifts);
             self.book_shifts(&shifts, to - 0.5 * dt);
@@ -293,7 +304,7 @@ impl<const D: usize> Sweep<'_, D> {
         bins: OfLeaf<'_, D>,
         notes: Notes<'_, D>,
     ) -> Departed {
-        let Notes { maxima, signal, pushes, near, conveyed, shift, struck, failed } = notes;
+        let Notes { maxima, signal, pushes, near, conveyed, shift, shock, struck, failed } = notes;
         let is_empty = chunk.is_empty();
         self.watch.before(chunk, maxima);
         let aabb = self.borders.of_leaf(leaf);
@@ -302,7 +313,7 @@ impl<const D: usize> Sweep<'_, D> {
         let start = (follows || is_beside).then(|| positions(chunk));
         let in_sources = Conveyed::of_leaf(&self.conveyors, chunk, aabb);
         *signal = self.gather(scratch, leaf, chunk, &bins);
-        *shift = scratch.shifted.total();
+        (*shift, *shock) = (scratch.booked.shift(), scratch.booked.shock());
         conveyed.clear();
         if !in_sources.is_empty() {
             in_sources.convey(&self.conveyors, chunk, self.dt, conveyed);
@@ -383,7 +394,7 @@ impl<const D: usize> Sweep<'_, D> {
         bins: &OfLeaf<'_, D>,
     ) -> f64 {
         scratch.leavers.begin(self.borders.of_leaf(leaf));
-        scratch.shifted = Shifted::default();
+        scratch.booked = Booked::default();
         if chunk.is_empty() {
             return 0.0;
         }
@@ -447,10 +458,10 @@ impl<const D: usize> Sweep<'_, D> {
         let next = next.map_or(Place::default(), |next| self.places[self.plan.bins[next].leaf as usize]);
         let (frame, scheme, dt) = (&bin.frame, self.scheme, self.dt);
         let dilation = &mean_dilation.added[..];
-        let (fields, shifted) = (&nodes, &mut scratch.shifted);
+        let (fields, booked) = (&nodes, &mut scratch.booked);
         let filling = self.filling(&scratch.mean_volumes);
         let filling = filling.as_ref();
-        g2p::Gather { scratch: kernel, chunk, frame, scheme, dt, fields, leavers, dilation, filling, shifted }
+        g2p::Gather { scratch: kernel, chunk, frame, scheme, dt, fields, leavers, dilation, filling, booked }
             .whole_boxes(whole, next)
     }
 
@@ -485,11 +496,11 @@ impl<const D: usize> Sweep<'_, D> {
     /// Advances the particles whose boxes are cut, once all parts have gathered. Returns as
     /// [`Sweep::gather`].
     fn advance_cut(&self, scratch: &mut Scratch<D>, leaf: usize, chunk: &mut Chunk<D>, cut: &[u32]) -> f64 {
-        let Scratch { kernel, gathered, leavers, mean_dilation, mean_volumes, shifted, .. } = scratch;
+        let Scratch { kernel, gathered, leavers, mean_dilation, mean_volumes, booked, .. } = scratch;
         let (cell, extent) = (self.plan.finest_cell(leaf), self.plan.extent());
         let (scheme, dt, dilation) = (self.scheme, self.dt, &mean_dilation.added[..]);
         let filling = self.filling(mean_volumes);
         let update = g2p::Advance { scheme, dt, cell, dilation, filling: filling.as_ref() };
-        g2p::advance_gathered(kernel, chunk, cut, gathered, &update, &extent, (leavers, shifted))
+        g2p::advance_gathered(kernel, chunk, cut, gathered, &update, &extent, (leavers, booked))
     }
 }

@@ -133,7 +133,7 @@ impl Law for Gas {
 
     /// The gas takes it up: nothing is work of its own.
     #[inline(always)]
-    fn take_heat<V: Vector>(&self, state: &mut State<V>, heat: V) {
+    fn take_heat<V: Vector>(&self, state: &mut State<V>, heat: V) -> V {
         let gain = heat * (self.gamma - 1.0);
         let stiffness = state.wave_speed * state.wave_speed * (self.density / self.gamma);
         let entropy = state.history[ENTROPY];
@@ -142,6 +142,7 @@ impl Law for Gas {
             *normal = *normal - gain;
         }
         state.wave_speed = self.sound(stiffness + gain);
+        heat
     }
 
     fn density(&self) -> f64 {

@@ -15,7 +15,7 @@ mod nodes;
 mod solid;
 
 use crate::kernel::fill::Flow;
-use crate::material::Material;
+use crate::material::{Material, SHOCK_SUMS};
 use crate::solver::physics::Physics;
 use crate::solver::state::Solver;
 
@@ -47,6 +47,20 @@ impl<const D: usize> Solver<D> {
         for shift in shifts.iter().filter(|shift| **shift != [0.0; D]) {
             shift.iter().zip(gravity).for_each(|(way, gravity)| sum.add(-way * gravity));
         }
+    }
+
+    /// Not collective. Adds work and heat of artificial viscosity in a step.
+    pub(super) fn book_shocks(&mut self) {
+        let Some(sums) = self.shock_sums.of.first_mut() else { return };
+        for shock in self.leaf_data.shocks.iter().filter(|shock| **shock != [0.0; SHOCK_SUMS]) {
+            sums.iter_mut().zip(shock).for_each(|(sum, work)| sum.add(*work));
+        }
+    }
+
+    /// Collective. Work of artificial viscosity since the start and the part of it that is heat of the
+    /// material, J, where there is any.
+    pub fn shock_work(&self) -> Option<[f64; SHOCK_SUMS]> {
+        self.shock_sums.totals(&self.comm).first().copied()
     }
 
     /// Collective. Work of the shifts since the start, J, where there are fluids.
