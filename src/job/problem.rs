@@ -345,9 +345,9 @@ impl MaterialSetup {
         undrained::build(&self.model, self.undrained.as_ref(), self.density)
     }
 
-    /// Whether it is a gas.
+    /// Whether it is a gas, or becomes one.
     pub fn is_gas(&self) -> bool {
-        matches!(self.model, Parameters::Gas(_))
+        matches!(self.model, Parameters::Gas(_) | Parameters::Explosive(_))
     }
 }
 

@@ -165,6 +165,9 @@ pub trait Law: std::fmt::Debug + Send + Sync {
         [0.0; HISTORIES]
     }
 
+    /// See [`Material::place_history`].
+    fn place_history(&self, _place: &[f64], _time: f64, _history: &mut [f64; HISTORIES]) {}
+
     /// See [`Material::softens`].
     fn softens(&self) -> bool {
         false
@@ -253,6 +256,10 @@ pub trait Material: std::fmt::Debug + Send + Sync {
     /// History variables of an undeformed particle.
     fn initial_history(&self) -> [f64; HISTORIES];
 
+    /// Changes the history of an undeformed particle by its place in the job (m) and the time (s) at which it
+    /// begins.
+    fn place_history(&self, _place: &[f64], _time: f64, _history: &mut [f64; HISTORIES]) {}
+
     /// Stiffness of water that cannot leave the pores, Pa; 0 where there is none (see [`super::undrained`]).
     fn water_modulus(&self) -> f64 {
         0.0
@@ -332,6 +339,10 @@ impl<L: Law> Material for L {
 
     fn initial_history(&self) -> [f64; HISTORIES] {
         Law::initial_history(self)
+    }
+
+    fn place_history(&self, place: &[f64], time: f64, history: &mut [f64; HISTORIES]) {
+        Law::place_history(self, place, time, history);
     }
 
     fn softens(&self) -> bool {

@@ -227,9 +227,11 @@ impl<const D: usize> Physics<D> {
         if pressure > 0.0 {
             chunk.write(Layout::<D>::STRESS, p, &[-pressure; 3]);
         }
-        for (h, value) in self.materials[material].initial_history().into_iter().enumerate() {
-            chunk.column_mut(Layout::<D>::HISTORY + h)[p] = value;
-        }
+        let mut history = self.materials[material].initial_history();
+        let place: [f64; D] = std::array::from_fn(|a| chunk.position(p)[a] + self.origin[a]);
+        let now = self.stage_starts.last().copied().unwrap_or(0.0);
+        self.materials[material].place_history(&place, now, &mut history);
+        chunk.write(Layout::<D>::HISTORY, p, &history);
     }
 
     /// The particles of a velocity field; `None` where all share one.

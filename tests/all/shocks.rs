@@ -1,5 +1,5 @@
 //! Shocks through the whole program: Sod's tube against the exact solution of its Riemann problem, Noh's
-//! problem, gas at rest, a blast; plates of metal, and metal that opens.
+//! problem, gas at rest, a blast; plates of metal, and metal that opens; detonations.
 use std::path::Path;
 
 use agimp::material::Parameters;
@@ -227,8 +227,8 @@ fn same_bits_on_any_ranks_and_across_restart() {
     });
 }
 
-/// A plate of copper strikes a rigid wall, which is half of an impact of two such plates: behind the shock, of the
-/// speed `c₀ + s u`, are the states of Rankine and Hugoniot.
+/// A plate of copper strikes a rigid wall, which is half of an impact of two such plates: behind the shock,
+/// of the speed `c₀ + s u`, are the states of Rankine and Hugoniot.
 #[test]
 fn a_plate_that_strikes_a_wall_has_the_states_behind_its_shock() {
     let [density, sound, slope] = [8930.0, 3940.0, 1.489];
@@ -268,7 +268,8 @@ fn a_plate_that_strikes_a_wall_has_the_states_behind_its_shock() {
     }
 }
 
-/// Metal with a tension limit opens there, bears nothing while it is open, and pressure again once it has closed.
+/// Metal with a tension limit opens there, bears nothing while it is open, and pressure again once it has
+/// closed.
 #[test]
 fn metal_opens_at_its_tension_limit() {
     let text = "model = 'von_mises', young = 1.24e11, poisson = 0.34, yield_stress = 9e7, \
@@ -297,4 +298,81 @@ fn metal_opens_at_its_tension_limit() {
         assert!(mean(&point) < 1e6, "{point:?}");
     }
     assert!(point.history[1] == 0.0 && mean(&point) < -1e8, "{point:?}");
+}
+
+/// TNT (Lee, Finger and Collins 1973), lit at the lower left corner.
+const TNT: &str = "[[materials]]\nname = 'tnt'\ndensity = 1630\nmodel = 'explosive'\na = 3.712e11\nb = 3.231e9\nr1 = 4.15\n\
+    r2 = 0.95\nomega = 0.3\nenergy = 7e9\ndetonation_velocity = 6930\nignition = [{ point = [0, 0] }]\n\
+    [[bodies]]\nname = 'charge'\nmaterial = 'tnt'\nparticles_per_cell = 4\nshape = { kind = 'box', min = [0, 0], max = [1, {h}] }\n";
+
+/// Pressures behind a plane detonation of TNT that starts at a wall, at shares x/(D t) of its way: the
+/// isentrope from the state of Chapman and Jouguet, where the line of Rayleigh of the given D touches it.
+fn taylor_wave(shares: &[f64]) -> Vec<f64> {
+    let ([a, b, r1, r2, omega], [density, front]) = ([3.712e11, 3.231e9, 4.15, 0.95, 0.3], [1630.0, 6930.0]);
+    // At 21 GPa.
+    let start = 1.0 - 21e9 / (density * front * front);
+    let cold = |v: f64| a * (-r1 * v).exp() + b * (-r2 * v).exp();
+    let thermal = (21e9 - cold(start)) * start.powf(1.0 + omega);
+    let stiffness = |v: f64| {
+        a * r1 * (-r1 * v).exp() + b * r2 * (-r2 * v).exp() + thermal * (1.0 + omega) * v.powf(-2.0 - omega)
+    };
+    let mut wave = Vec::new();
+    let (mut v, mut speed) = (start, front * (1.0 - start));
+    let step = 1e-5;
+    while speed > 0.0 {
+        let sound = (stiffness(v) / density).sqrt();
+        wave.push([(speed + v * sound) / front, cold(v) + thermal * v.powf(-1.0 - omega)]);
+        (v, speed) = (v + step, speed - step * sound);
+    }
+    let last = wave[wave.len() - 1];
+    shares.iter().map(|share| wave.iter().find(|[at, _]| at <= share).unwrap_or(&last)[1]).collect()
+}
+
+/// Behind the front are the states of Taylor's wave, from that of Chapman and Jouguet to rest at the wall,
+/// and the energies add up.
+#[test]
+fn a_detonation_is_followed_by_taylors_wave() {
+    let numerics = "artificial_viscosity = {}\ntransfer = 'flip'\nflip = 1";
+    let end = 0.9 / 6930.0;
+    let strip = Strip { cells: 200, numerics, matter: TNT, end, cfl: 0.5 };
+    let (history, state) = strip.run();
+    let way = 6930.0 * history.last("time");
+    for (share, exact) in [0.3, 0.6, 0.7, 0.8, 0.9].into_iter().zip(taylor_wave(&[0.3, 0.6, 0.7, 0.8, 0.9])) {
+        let found = mean(&state, [(share - 0.01) * way, (share + 0.01) * way], 2);
+        println!("{share} of the way: {found:.4e} Pa for {exact:.4e}");
+        // Half of it with 400 cells.
+        assert!((found / exact - 1.0).abs() < 0.04, "{share}: {found} for {exact}");
+    }
+    let greatest = state.iter().map(|p| p[2]).fold(0.0, f64::max);
+    println!("greatest pressure {greatest:.4e} Pa");
+    assert!((greatest / 21e9 - 1.0).abs() < 0.1, "{greatest}");
+    let reached = state.iter().filter(|p| p[2] > 5e9).map(|p| p[0]).fold(0.0, f64::max);
+    assert!((reached / way - 1.0).abs() < 0.015, "a front at {reached} for {way}");
+    let change = change_of_energy(&history, 7e9 * way * 0.02);
+    println!("energies change by {change:.4} of that of the explosive");
+    assert!(change < 0.01, "{change}");
+}
+
+/// A charge in sand, with a tree that follows the burn.
+#[test]
+fn a_charge_has_the_same_bits_on_any_ranks_and_across_restart() {
+    let disk = "{ kind = 'circle', centre = [0, 0.9], radius = 0.3 }";
+    let text = format!(
+        "version = 1\ndimension = 2\ngeometry = 'axisymmetric'\ndomain = {{ size = [2, 2], root_edge = 0.5 }}\n\
+         boundaries = {{ x_max.kind = 'slip', y_min.kind = 'slip', y_max.kind = 'slip' }}\n\
+         [numerics]\nboxes = 'cell'\nartificial_viscosity = {{}}\n{}\
+         [[materials]]\nname = 'sand'\ndensity = 1700\nmodel = 'drucker_prager'\nyoung = 2e9\npoisson = 0.25\nfriction_angle = 35\n\
+         [[bodies]]\nname = 'ground'\nmaterial = 'sand'\n\
+         shape = {{ kind = 'difference', from = {{ kind = 'box', min = [0, 0], max = [2, 1.5] }}, remove = [{disk}] }}\n\
+         [adaptivity]\nevery_steps = 5\n[[adaptivity.criteria]]\nkind = 'plastic_strain'\nrefine = 0.5\nlevel = 1\n\
+         [history]\nevery_steps = 5\n[checkpoint]\nevery_steps = 10\nkeep = 99\n[time]\nend = 2e-4\n[output]\npicture = false\n\
+         fields = ['density', 'pressure', 'plastic_strain']\n",
+        TNT.replace("{ kind = 'box', min = [0, 0], max = [1, {h}] }", disk)
+            .replace("point = [0, 0]", "point = [0, 0.8]")
+    );
+    restart::assert_same_on_any_ranks(&text, "charge", |directory, _| {
+        let history = History::read(directory, "charge");
+        assert!(history.last("elastic_energy") < 0.0 && history.last("viscous_heat") > 0.0);
+        assert!(history.last("particles") != history.column("particles")[0], "nothing was split");
+    });
 }

@@ -32,7 +32,7 @@ pub(super) fn failed(
     let full = |material: &file::Material| material.saturated_density.unwrap_or(material.density);
     let fault = if std::ptr::eq(own, other) {
         Some("found the material itself; expected another one".to_owned())
-    } else if law.is_fluid() || matches!(other.model, Parameters::Gas(_)) {
+    } else if law.is_fluid() || matches!(other.model, Parameters::Gas(_) | Parameters::Explosive(_)) {
         Some(format!("found \"{quoted}\", which is no solid; expected a solid"))
     } else if other.undrained.is_some() {
         Some(format!("found \"{quoted}\", which is undrained; expected a material without `undrained`"))

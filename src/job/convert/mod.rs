@@ -34,6 +34,7 @@ use crate::geometry::written::{Shape as Written, Vector};
 use crate::geometry::{Aabb, Sampling, Shape};
 use crate::load::{Gravity, Load};
 use crate::material::Failed;
+use crate::material::laws::flow::explosive;
 use crate::material::parameters::{OutOfRange, Parameters};
 use crate::material::undrained::Undrained;
 use crate::particle::followed::Motion;
@@ -115,7 +116,7 @@ fn problem<const D: usize>(
     let space = Space { origin, size: brick.roots.map(|n| f64::from(n) * root_edge) };
 
     let tree = tree(checks, &file.tree, &brick, &space, &root.key("tree"));
-    let materials = materials(checks, &file.materials, &root.key("materials"));
+    let materials = materials(checks, &file.materials, D, &root.key("materials"));
     let bodies = bodies(checks, file, &space, &root.key("bodies"));
     let colliders = colliders(checks, &file.colliders, &space, &root.key("colliders"));
     let gravity = match &file.gravity {
@@ -380,7 +381,12 @@ fn names<'a>(checks: &mut Checks, names: impl Iterator<Item = &'a str>, path: &P
     }
 }
 
-fn materials(checks: &mut Checks, materials: &[file::Material], path: &Path) -> Vec<MaterialSetup> {
+fn materials(
+    checks: &mut Checks,
+    materials: &[file::Material],
+    dimension: usize,
+    path: &Path,
+) -> Vec<MaterialSetup> {
     names(checks, materials.iter().map(|material| material.name.as_str()), path);
     for (i, material) in materials.iter().enumerate() {
         if let Err(OutOfRange { key, value, range }) = material.model.check() {
@@ -388,6 +394,9 @@ fn materials(checks: &mut Checks, materials: &[file::Material], path: &Path) -> 
             checks.fault(&own, format!("found {value}; expected a number {range}"));
         } else if let Some(water) = &material.undrained {
             undrained(checks, water, &material.model, &path.index(i));
+        }
+        if let Parameters::Explosive(own) = &material.model {
+            ignition(checks, own, dimension, &path.index(i).key("ignition"));
         }
         if let Some(factor) = material.strength_factor
             && material.model.weakened(factor).is_none()
@@ -403,6 +412,19 @@ fn materials(checks: &mut Checks, materials: &[file::Material], path: &Path) -> 
             MaterialSetup { failed, ..material_setup(material) }
         })
         .collect()
+}
+
+/// Faults of the points from which an explosive burns.
+fn ignition(checks: &mut Checks, own: &explosive::Parameters, dimension: usize, path: &Path) {
+    for (number, ignition) in own.ignition.iter().enumerate() {
+        if ignition.point.len() != dimension {
+            let message = format!(
+                "found {} coordinates; expected {dimension}, as many as the job has dimensions",
+                ignition.point.len()
+            );
+            checks.fault(&path.index(number).key("point"), message);
+        }
+    }
 }
 
 /// Faults of water in the pores of a material.

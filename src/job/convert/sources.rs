@@ -6,6 +6,7 @@ use crate::job::parse::source::Path;
 use crate::job::problem::{Body, CELLS_PER_LEAF, TreeSetup};
 use crate::job::schema::common::FASTEST;
 use crate::job::schema::job_file::{self as file, JobFile, Source as WrittenSource};
+use crate::material::parameters::Parameters;
 use crate::quantity::Quantity;
 use crate::source::{Source, particles_in};
 use crate::text::{number as rounded, quantity, written as number};
@@ -85,6 +86,13 @@ fn source<const D: usize>(
     let mut materials = FxHashMap::default();
     for (number, material) in file.materials.iter().enumerate() {
         materials.entry(material.name.as_str()).or_insert(number);
+    }
+    let law = materials.get(written.material.as_str()).map(|&number| &file.materials[number].model);
+    if let Some(Parameters::Explosive(own)) = law
+        && !own.ignition.is_empty()
+    {
+        let message = "found an explosive with `ignition`, which counts from where particles are at the start; expected another material, or the explosive as a body";
+        checks.fault(&path.key("material"), message.into());
     }
     let body = super::body(checks, &as_body, &materials, file, space, path)?;
     let velocity = velocity?;

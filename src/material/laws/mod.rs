@@ -14,7 +14,7 @@
 //! | `drucker_prager.rs` | sand: Drucker-Prager yield |
 //! | `mohr_coulomb.rs` | soil, rock: Mohr-Coulomb yield |
 //! | `cap/` | clay, snow and other matter that yields under pressure alone |
-//! | `flow/` | fluid, gas, dense granular flow |
+//! | `flow/` | fluid, gas, high explosive, dense granular flow |
 use schemars::JsonSchema;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
@@ -160,6 +160,8 @@ materials! {
     Fluid(flow::fluid::Fluid),
     /// Ideal or stiffened gas: `p = (γ - 1) ρ e - γ p_∞`.
     Gas(flow::gas::Gas),
+    /// High explosive: products after Jones, Wilkins and Lee, with a burn that starts at points.
+    Explosive(flow::explosive::Explosive),
 }
 
 impl Parameters {
