@@ -127,7 +127,9 @@ fn word(choice: &Value) -> String {
     let tag = tagged
         .into_iter()
         .find_map(|(key, value)| Some(format!("`{key} = \"{}\"`", value["const"].as_str()?)));
-    tag.unwrap_or_default()
+    // A choice without a tag is named by its key.
+    let key = || choice["properties"].as_object()?.keys().next().map(|key| format!("`{{ {key} = … }}`"));
+    tag.or_else(key).unwrap_or_default()
 }
 
 /// The description on one line; bars would end a cell of a table.
