@@ -417,10 +417,10 @@ fn materials(
 /// Faults of the points from which an explosive burns.
 fn ignition(checks: &mut Checks, own: &explosive::Parameters, dimension: usize, path: &Path) {
     for (number, ignition) in own.ignition.iter().enumerate() {
-        if ignition.point.len() != dimension {
+        if ignition.point.0.len() != dimension {
             let message = format!(
                 "found {} coordinates; expected {dimension}, as many as the job has dimensions",
-                ignition.point.len()
+                ignition.point.0.len()
             );
             checks.fault(&path.index(number).key("point"), message);
         }

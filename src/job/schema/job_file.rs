@@ -340,7 +340,10 @@ pub enum Failed {
     /// They become another material of the job, of this name, a solid of the same density, such as sand: rubble. Mass, velocity and volume stay;
     /// shear stress goes, and the pressure is that of the volume in the new material. Bodies of `stages` that change their material do not
     /// change that of their rubble.
-    Material(String),
+    Material(
+        /// Name of the material.
+        String,
+    ),
 }
 
 /// A body: a shape filled with particles of a material.

@@ -14,6 +14,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use crate::geometry::written;
 use crate::material::initial::Consolidation;
 use crate::material::laws::Model;
 use crate::material::parameters::OutOfRange;
@@ -73,8 +74,7 @@ pub struct Parameters {
 #[serde(deny_unknown_fields)]
 pub struct Ignition {
     /// The point, m, in the coordinates of the job.
-    #[schemars(length(min = 2, max = 3))]
-    pub point: Vec<f64>,
+    pub point: written::Vector,
     /// Time at which it is lit, s.
     #[serde(default)]
     #[schemars(range(min = 0.0, max = 1e12))]
@@ -303,7 +303,7 @@ impl Law for Explosive {
 
     fn place_history(&self, place: &[f64], time: f64, history: &mut [f64; HISTORIES]) {
         let way = |point: &[f64]| point.iter().zip(place).map(|(a, x)| (a - x) * (a - x)).sum::<f64>().sqrt();
-        let arrivals = self.ignition.iter().map(|own| own.time + way(&own.point) / self.detonation);
+        let arrivals = self.ignition.iter().map(|own| own.time + way(&own.point.0) / self.detonation);
         if let Some(first) = arrivals.reduce(f64::min) {
             history[BURN] = (time - first).min(0.0);
         }
