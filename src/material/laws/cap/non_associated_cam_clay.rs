@@ -72,7 +72,7 @@ impl Model for NonAssociatedCamClay {
 
 /// Invariants of the elastic tensor.
 #[derive(Clone, Copy)]
-struct RegridTimers<V> {
+struct Invariants<V> {
     /// J².
     square: V,
     /// J^(-2/3).
@@ -81,7 +81,7 @@ struct RegridTimers<V> {
     mean: V,
 }
 
-impl<V: Vector> RegridTimers<V> {
+impl<V: Vector> Invariants<V> {
     #[inline(always)]
     fn of(b: &[V; 6]) -> Self {
         let square = determinant(b);
@@ -91,14 +91,14 @@ impl<V: Vector> RegridTimers<V> {
 
 impl NonAssociatedCamClay {
     #[inline(always)]
-    fn stored<V: Vector>(&self, parts: &RegridTimers<V>) -> V {
+    fn stored<V: Vector>(&self, parts: &Invariants<V>) -> V {
         let one = V::splat(1.0);
         let isochoric = parts.mean.mul_add(parts.scale, -one) * (1.5 * self.mu);
         isochoric + (parts.square - one - ln(parts.square)) * (0.25 * self.kappa)
     }
 
     #[inline(always)]
-    fn load<V: Vector>(&self, state: &mut State<V>, parts: &RegridTimers<V>) {
+    fn load<V: Vector>(&self, state: &mut State<V>, parts: &Invariants<V>) {
         let one = V::splat(1.0);
         let b = &state.elastic;
         let pressure = (one - parts.square) * (0.5 * self.kappa);
@@ -127,7 +127,7 @@ impl Law for NonAssociatedCamClay {
         let p = &self.parameters;
         let (beta, slope, kappa) = (p.cohesion_ratio, p.critical_stress_ratio, self.kappa);
         let consolidation = state.history[CONSOLIDATION];
-        let trial = RegridTimers::of(&state.elastic);
+        let trial = Invariants::of(&state.elastic);
         let mut deviator = state.elastic;
         for normal in &mut deviator[..3] {
             *normal = *normal - trial.mean;
@@ -172,7 +172,7 @@ impl Law for NonAssociatedCamClay {
             let lost = ln(trial.square) - ln(tip.select(at_tip, at_crossing));
             state.history[CONSOLIDATION] =
                 changed.select(lost.mul_add(V::splat(-0.5), consolidation), consolidation);
-            end = RegridTimers::of(&state.elastic);
+            end = Invariants::of(&state.elastic);
             let opened =
                 (ln(trial.square) - ln(end.square)).mul_add(V::splat(0.5), state.history[PLASTIC_VOLUME]);
             state.history[PLASTIC_VOLUME] = changed.select(opened, state.history[PLASTIC_VOLUME]);
@@ -186,7 +186,7 @@ impl Law for NonAssociatedCamClay {
 
     #[inline(always)]
     fn energy<V: Vector>(&self, state: &State<V>, _plane: bool) -> V {
-        self.stored(&RegridTimers::of(&state.elastic))
+        self.stored(&Invariants::of(&state.elastic))
     }
 
     fn density(&self) -> f64 {
