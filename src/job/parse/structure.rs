@@ -171,6 +171,25 @@ impl<'s> Checker<'s> {
             }
             return found.copied();
         }
+        // Words beside tables, such as "delete" or { material = "rubble" }.
+        if let Toml::Text(word) = &node.value
+            && options.iter().any(|option| option.get("const").is_some())
+        {
+            let word_of = |option: &'s Value| option.get("const")?.as_str();
+            let found = options.iter().find(|option| word_of(option) == Some(word));
+            if found.is_none() {
+                let words: Vec<&str> = options.iter().filter_map(|option| word_of(option)).collect();
+                let key_of = |option: &&'s Value| option.get("required")?.get(0)?.as_str();
+                let tables = options.iter().filter_map(key_of).map(|key| format!("{{ {key} = … }}"));
+                let all: Vec<String> = words.iter().map(|word| format!("\"{word}\"")).chain(tables).collect();
+                let guess =
+                    nearest(word, words).map_or(String::new(), |w| format!("; did you mean \"{w}\"?"));
+                let message =
+                    format!("found \"{}\"; expected one of {}{guess}", excerpt(word, QUOTED), all.join(", "));
+                self.fault(node, path, message, layers);
+            }
+            return found.copied();
+        }
         // Tables that differ by the key that each needs, which may be misspelt.
         if let Toml::Table(entries) = &node.value {
             let key_of = |option: &'s Value| {
@@ -252,9 +271,9 @@ impl<'s> Checker<'s> {
             }
             // A misspelt key was most likely meant to be one that is missing.
             let keys = layers.properties().filter(|(_, schema)| self.fits(schema)).map(|(known, _)| known);
-            // One that is there already can be meant by a setting of the command line.
-            let free = keys.clone().filter(|known| node.get(known).is_none());
-            let known = free.chain(keys.clone().filter(|known| node.get(known).is_some()));
+            // A key that is there already is meant where it is very near, as in a setting of the command line.
+            let is_near = |known: &&str| known.len() > 4 && strsim::damerau_levenshtein(key, known) <= 2;
+            let known = keys.clone().filter(|known| node.get(known).is_none() || is_near(known));
             let meant = nearest(key, missing.iter().copied()).or_else(|| nearest(key, known));
             let quoted = excerpt(key, QUOTED);
             let message = match meant {
