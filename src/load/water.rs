@@ -8,7 +8,7 @@
 //! of ∇p over a box is the difference of p between its faces over its width, also where the water table
 //! passes through the box. So material whose weight the water bears is at rest to round-off.
 //!
-//! The volume is that of the undeformed material: its mass has the water that its pores had then. Water that comes
+//! The volume is that of the mass at the density of the material: it has the water of these pores. Water that comes
 //! as they open, and goes as they close, bears its own weight. So grains that the flow has parted sink with
 //! the weight that they have under water, whatever the space between them.
 use std::borrow::Cow;

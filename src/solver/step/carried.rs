@@ -11,10 +11,9 @@ use rayon::prelude::*;
 use crate::exact_sum::ExactSum;
 use crate::leapfrog::Lengths;
 use crate::load::{Carried, Kind, Load, cofactor};
-use crate::particle::chunk::{Chunk, Layout};
+use crate::particle::chunk::{Chunk, Layout, Tag};
 use crate::particle::followed::head;
 use crate::particle::strain;
-use crate::particle::volume::reference_volume;
 use crate::simd::Vector;
 use crate::solver::sorting::bins::BoxWidths;
 use crate::solver::sorting::box_bounds::Widths;
@@ -70,6 +69,10 @@ struct Pushing<'a, const D: usize> {
     gravity: [f64; D],
     /// Gravity that acts on particles, m/s²: all where masses are scaled; else 0, as it acts on nodes.
     on_particles: [f64; D],
+    /// Column of the share of the pores that is full, if particles carry it.
+    saturation: Option<usize>,
+    /// By material, its density, kg/m³, and that with full pores over it.
+    densities: Vec<[f64; 2]>,
     /// Whether forces act on all particles, and not only on those that carry something.
     all: bool,
     /// Middle of the time over which forces act, s.
@@ -114,6 +117,14 @@ impl<const D: usize> Pushing<'_, D> {
         before
     }
 
+    /// Volume (m³) of a particle of this mass (kg) where its material has its density. Water that comes as pores
+    /// open, and goes as they close, bears its own weight, so that of grains under water stays.
+    fn volume_of_mass(&self, chunk: &Chunk<D>, p: usize, mass: f64) -> f64 {
+        let [density, saturated] = self.densities[usize::from(Tag::unpack(chunk.tags()[p]).material)];
+        let full = self.saturation.and_then(|column| chunk.carried(column).get(p).copied()).unwrap_or(0.0);
+        mass / (density * full.mul_add(saturated - 1.0, 1.0))
+    }
+
     /// Force of a load on a particle of this mass (kg) in a leaf with cells of this edge (m), N, if it has any.
     /// Water needs the half widths of its box, m.
     fn force(
@@ -135,9 +146,10 @@ impl<const D: usize> Pushing<'_, D> {
                 let at = place(&chunk.position(p)).now;
                 let water = water.about(head(chunk, self.head, p, &load.origin));
                 let per_volume = water.force(at, half?, self.middle - load.start, &self.gravity);
-                // Of the undeformed volume: water that comes as pores open, and goes as they close, has its own
-                // weight, so that the weight of grains under water stays.
-                (per_volume != [0.0; D]).then(|| per_volume.map(|force| reference_volume(chunk, p) * force))
+                (per_volume != [0.0; D]).then(|| {
+                    let volume = self.volume_of_mass(chunk, p, mass);
+                    per_volume.map(|force| volume * force)
+                })
             }
             _ => {
                 let x = chunk.position(p);
@@ -172,6 +184,13 @@ impl<const D: usize> Solver<D> {
             loads: loads.into_iter().filter(|(_, load)| load.is_active(time)).collect(),
             displacement: physics.followed_columns().displacement,
             head: physics.followed_columns().head,
+            saturation: physics.followed_columns().saturation,
+            densities: physics
+                .materials
+                .iter()
+                .zip(&physics.saturated)
+                .map(|(material, saturated)| [material.density(), *saturated])
+                .collect(),
             gravity: physics.gravity.at(middle),
             on_particles: if scaled { physics.gravity.at(middle) } else { [0.0; D] },
             middle,
