@@ -7,7 +7,7 @@
 //! where C is constant without heat; heat h adds `ω V^ω h` to it. What has not burned has the pressure `ρ c²
 //! (1 - V)` and the energy `E₀ + ρ c² (1 - V)²/2`. A particle with the burnt part F has the sums of both,
 //! weighted with F and 1 - F. The front reaches a particle at `t₀ + |X - X₀|/D` (programmed burn, Wilkins
-//! 1964); from then on F grows to 1 while the front passes [`WIDTH`] cells. What burns at a volume V keeps
+//! 1964); from then on F grows to 1 while the front passes `WIDTH` cells. What burns at a volume V keeps
 //! its energy, and so becomes products with the C of `E(V, C) = E₀ + ρ c² (1 - V)²/2`; C of the particle is
 //! the mean by mass. So energy is conserved to round-off, and a steady front has the state of Chapman and
 //! Jouguet if `D` and `E₀` belong to the products.
