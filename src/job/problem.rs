@@ -335,7 +335,7 @@ pub struct MaterialSetup {
     pub model: Parameters,
     /// Water that cannot leave its pores.
     pub undrained: Option<Undrained>,
-    /// What becomes of its particles when they fail.
+    /// Fate of its particles when they fail.
     pub failed: Failed,
 }
 

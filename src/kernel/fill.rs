@@ -33,7 +33,7 @@ const SHIFT: f64 = 0.15;
 const FARTHEST: f64 = 0.05;
 /// Rate β towards the mean of a cell, in speeds of sound over cells.
 const MEAN: f64 = 0.05;
-/// Least distance from a wall to which particles are booked, as a share of a cell.
+/// Least distance from a wall to which particles are shifted, as a share of a cell.
 const CLOSEST: f64 = 1e-9;
 
 /// A material in a step.

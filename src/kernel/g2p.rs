@@ -61,7 +61,7 @@ pub struct Gather<'a, const D: usize> {
     pub dilation: &'a [f64],
     /// Data that keep fluids at their volume, in jobs with fluids; `fields` then has how full nodes are.
     pub filling: Option<&'a Filling<'a>>,
-    /// Sum of the shifts that this gives to particles.
+    /// Sums for the history: of the shifts that this gives to particles, of the work of artificial viscosity.
     pub booked: &'a mut Booked<D>,
 }
 

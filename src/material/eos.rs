@@ -17,7 +17,6 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::hardening::Hardening;
-use super::initial::Consolidation;
 use super::laws::von_mises::{VonMises, Whole};
 use super::parameters::OutOfRange;
 use super::tensor::eigen::determinant;
@@ -257,15 +256,6 @@ impl Law for Shocked {
 
     fn history_names(&self) -> &'static [&'static str] {
         &["plastic_strain", "plastic_volume", "heat"]
-    }
-
-    fn strain_under(
-        &self,
-        _stress: [f64; 3],
-        _consolidation: Option<Consolidation>,
-        _history: &mut [f64; HISTORIES],
-    ) -> Option<[f64; 3]> {
-        None
     }
 }
 

@@ -47,7 +47,7 @@ pub use shock::{SHOCK_SUMS, Shock, Viscosity};
 pub use tangent::Tangent;
 pub use tensor::eigen::{self, Symmetric};
 
-/// What becomes of a particle whose material has failed.
+/// Fate of a particle whose material has failed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Failed {
     /// It stays, with what its law leaves it.

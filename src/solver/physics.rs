@@ -24,7 +24,7 @@ pub struct Physics<const D: usize> {
     pub graded: bool,
     /// Materials by index.
     pub materials: Vec<Box<dyn Material>>,
-    /// What becomes of particles that have failed, by material.
+    /// Fate of particles that have failed, by material.
     pub failed: Vec<Failed>,
     /// Times at which the stages so far have begun, s; the last is the one under way.
     pub stage_starts: Vec<f64>,

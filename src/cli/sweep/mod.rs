@@ -252,7 +252,7 @@ fn earlier(
     Ok(others.filter_map(|values| run(arguments, bytes, over, values).ok()).collect())
 }
 
-/// What rows are sorted by: numbers by size, before all other values.
+/// Key by which rows are sorted: numbers by size, before all other values.
 fn order(values: &[String]) -> Vec<(bool, f64, &str)> {
     let number =
         |value: &String| value.replace('_', "").parse::<f64>().ok().filter(|number| number.is_finite());

@@ -1,4 +1,4 @@
-//! What becomes of failed particles.
+//! The fate of failed particles.
 use super::checks::Checks;
 use crate::job::parse::error::QUOTED;
 use crate::job::parse::source::Path;
@@ -7,7 +7,7 @@ use crate::material::Failed;
 use crate::material::parameters::Parameters;
 use crate::text::{excerpt, written};
 
-/// What becomes of failed particles of a material, or faults.
+/// The fate of failed particles of a material, or faults.
 pub(super) fn failed(
     checks: &mut Checks,
     own: &file::Material,

@@ -319,7 +319,7 @@ pub struct Material {
     /// with. `density` is that of skeleton and water. By default there is none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub undrained: Option<Undrained>,
-    /// What becomes of particles that fail, of materials with `damage`: by default they stay, with what their law leaves them.
+    /// Fate of particles that fail, of materials with `damage`: by default they stay, with what their law leaves them.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub failed: Option<Failed>,
     /// Constitutive model and its parameters.
@@ -327,9 +327,10 @@ pub struct Material {
     pub model: Parameters,
 }
 
-/// What becomes of particles that have failed: those of `von_mises` with a damage of 0.99 of strength, those of `hencky` with a hundredth of
-/// their strength left. How many they are, and the mass, momentum and energy that go with them, are columns of `history.csv`: `failed`,
-/// `failed_mass`, `failed_x` and so on, `failed_kinetic_energy`, `failed_elastic_energy`, `failed_gravitational_energy`, `failed_plastic_work`.
+/// Fate of particles that have failed: those of `von_mises` with a damage of 0.99 of strength, those of `hencky`
+/// with a hundredth of their strength left. How many they are, and the mass, momentum and energy that go with them,
+/// are columns of `history.csv`: `failed`, `failed_mass`, `failed_x` and so on, `failed_kinetic_energy`,
+/// `failed_elastic_energy`, `failed_gravitational_energy`, `failed_plastic_work`.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Failed {

@@ -2,7 +2,7 @@
 //! that reaches nothing, points above the ground.
 use serde_json::Value;
 
-use super::NAME;
+use super::{NAME, foot};
 use crate::job::Problem;
 use crate::job::problem::MaterialSetup;
 use crate::load::Gravity;
@@ -75,7 +75,7 @@ fn water<const D: usize>(problem: &Problem<D>, all: &mut Vec<String>) {
     let reaches = |time: f64| {
         problem.bodies.iter().any(|body| {
             let bounds = body.shape.bounds();
-            let foot = if up.sign > 0.0 { bounds.lower[up.axis] } else { bounds.upper[up.axis] };
+            let foot = foot(&bounds, up);
             // At the foot of the body along a row of places: the table may be inclined.
             (0..=8).any(|part| {
                 let share = f64::from(part) / 8.0;
@@ -105,7 +105,7 @@ fn tracks<const D: usize>(problem: &Problem<D>, all: &mut Vec<String>) {
         let counts = |body: usize| track.bodies.as_ref().is_none_or(|all| all.contains(&(body as u16)));
         let bodies = problem.bodies.iter().enumerate().filter(|(body, _)| counts(*body));
         let nearest = bodies.map(|(_, body)| body.shape.distance(&track.point)).fold(f64::INFINITY, f64::min);
-        let cell = problem.root_edge / 4.0 / f64::from(1_u32 << problem.tree.base_level);
+        let cell = problem.cell_edge(problem.tree.base_level);
         if nearest.is_finite() && nearest > cell {
             all.push(format!(
                 "tracks[{index}].point: \"{}\" lies {} from the nearest body; expected a point in one: the track follows the particle nearest to {}",

@@ -9,8 +9,10 @@
 //! | `shock.rs` | gas without what its shocks need |
 //! | `stretch.rs` | elastic bodies that are stretched further than particles follow |
 //! | `units.rs` | properties that no matter has |
+use crate::geometry::Aabb;
 use crate::job::Problem;
 use crate::job::problem::{Body, Coordinates};
+use crate::load::Up;
 use crate::material::laws::drucker_prager::FrictionMatch;
 use crate::material::parameters::Parameters;
 use crate::text::{count, excerpt, number};
@@ -86,15 +88,20 @@ fn materials<const D: usize>(problem: &Problem<D>, all: &mut Vec<String>) {
     }
 }
 
+/// Coordinate (m) of the lowest point of bounds along the vertical.
+fn foot<const D: usize>(bounds: &Aabb<D>, up: Up) -> f64 {
+    if up.sign > 0.0 { bounds.lower[up.axis] } else { bounds.upper[up.axis] }
+}
+
 /// Bodies that reach below the water table, of materials that are no heavier there.
 fn saturated<const D: usize>(problem: &Problem<D>, all: &mut Vec<String>) {
     let Some(water) = problem.water() else { return };
     for (index, setup) in problem.materials.iter().enumerate() {
         let is_wet = |body: &Body<D>| {
             let (bounds, up) = (body.shape.bounds(), water.up);
-            let mut foot = bounds.centre();
-            foot[up.axis] = if up.sign > 0.0 { bounds.lower[up.axis] } else { bounds.upper[up.axis] };
-            body.material == index && water.is_below(problem.place(&foot), 0.0)
+            let mut lowest = bounds.centre();
+            lowest[up.axis] = foot(&bounds, up);
+            body.material == index && water.is_below(problem.place(&lowest), 0.0)
         };
         if setup.saturated_density == setup.density && problem.bodies.iter().any(is_wet) {
             all.push(format!(

@@ -14,8 +14,8 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::forget_shear;
 use crate::geometry::written;
-use crate::material::initial::Consolidation;
 use crate::material::laws::Model;
 use crate::material::parameters::OutOfRange;
 use crate::material::tensor::eigen;
@@ -225,14 +225,7 @@ impl Law for Explosive {
         let left = one - part;
         let pressure = part.mul_add(products.pressure, left * (one - volume) * self.bulk());
         let stiffness = part.mul_add(products.stiffness, left * self.bulk());
-        let sheared = zero.lt(strain.norm);
-        if sheared.any() {
-            let stretch = exp(strain.trace * (2.0 / 3.0));
-            for c in 0..6 {
-                let own = if c < 3 { stretch } else { zero };
-                state.elastic[c] = sheared.select(own, state.elastic[c]);
-            }
-        }
+        forget_shear(state, strain.trace, strain.norm);
         let tension = -(pressure * volume);
         state.stress = [tension, tension, tension, zero, zero, zero];
         state.work = zero;
@@ -312,15 +305,6 @@ impl Law for Explosive {
     fn alike(&self, a: &[f64; HISTORIES], b: &[f64; HISTORIES]) -> bool {
         let part = |history: &[f64; HISTORIES]| history[BURN].max(0.0);
         (a[BURN] < 0.0) == (b[BURN] < 0.0) && (part(a) - part(b)).abs() <= ALIKE
-    }
-
-    fn strain_under(
-        &self,
-        _stress: [f64; 3],
-        _consolidation: Option<Consolidation>,
-        _history: &mut [f64; HISTORIES],
-    ) -> Option<[f64; 3]> {
-        None
     }
 }
 

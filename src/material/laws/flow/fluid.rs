@@ -7,6 +7,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::forget_shear;
 use crate::material::initial::{Consolidation, even_pressure};
 use crate::material::laws::Model;
 use crate::material::tensor::strain::Strain;
@@ -82,15 +83,7 @@ impl Law for Fluid {
         for normal in &mut state.stress[..3] {
             *normal = *normal - pressure;
         }
-        // A particle that is not sheared keeps its bits.
-        let sheared = zero.lt(strain.norm);
-        if sheared.any() {
-            let stretch = exp(strain.trace * (2.0 / 3.0));
-            for c in 0..6 {
-                let own = if c < 3 { stretch } else { zero };
-                state.elastic[c] = sheared.select(own, state.elastic[c]);
-            }
-        }
+        forget_shear(state, strain.trace, strain.norm);
         let shear = state.history[PLASTIC_STRAIN];
         state.history[PLASTIC_STRAIN] = strain.norm.mul_add(V::splat(2.0_f64.sqrt()), shear);
         state.work = viscous * strain.norm * strain.norm;
