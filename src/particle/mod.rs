@@ -7,6 +7,7 @@ pub mod group;
 pub mod halvings;
 pub mod lanes;
 mod layout;
+pub mod pores;
 pub mod strain;
 pub mod volume;
 mod widest;

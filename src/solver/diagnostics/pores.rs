@@ -1,9 +1,7 @@
 //! Pressure of the water in the pores of particles.
 use crate::load::{Load, Water};
-use crate::material::undrained::excess_pressure;
-use crate::particle::chunk::{Chunk, Layout, Tag};
-use crate::particle::followed::head;
-use crate::quantity::in_job;
+use crate::particle::chunk::Chunk;
+use crate::particle::pores::{excess_pressure, given_pressure};
 use crate::solver::state::Solver;
 
 /// What the pressure in pores follows from, at a time.
@@ -36,16 +34,9 @@ impl<'a, const D: usize> Pores<'a, D> {
     /// undrained ground.
     pub(super) fn pressure(&self, chunk: &Chunk<D>, p: usize) -> f64 {
         let given = self.water.map_or(0.0, |(load, water)| {
-            let water = water.about(head(chunk, self.head, p, &self.origin));
-            let place = in_job(&self.origin, &chunk.position(p));
-            water.pressure(place, self.time - load.start, &self.gravity)
+            let carried = (self.head, &self.origin);
+            given_pressure(water, self.time - load.start, &self.gravity, carried, chunk, p)
         });
-        let modulus = self.moduli[usize::from(Tag::unpack(chunk.tags()[p]).material)];
-        if modulus == 0.0 {
-            return given;
-        }
-        let component = |c: usize| chunk.column(Layout::<D>::LEFT_CAUCHY_GREEN + c)[p];
-        let elastic = std::array::from_fn(|c| if c < Layout::<D>::SYMMETRIC { component(c) } else { 0.0 });
-        given + excess_pressure(modulus, &elastic, &chunk.read(Layout::<D>::HISTORY, p))
+        given + excess_pressure(&self.moduli, chunk, p)
     }
 }

@@ -6,12 +6,10 @@ use serde::{Deserialize, Serialize};
 use super::averages::{self, principal};
 use crate::grid::leaf_geometry::{LeafCells, leaf_box};
 use crate::io::snapshot::{ShownWater, View};
-use crate::material::undrained::excess_pressure;
 use crate::particle::chunk::{Chunk, Layout, Tag};
 use crate::particle::followed::{FirstColumns, head};
-use crate::particle::strain;
-use crate::particle::volume::{cauchy_stress, symmetric, volume, volume_ratio};
-use crate::quantity::in_job;
+use crate::particle::volume::{cauchy_stress, volume, volume_ratio};
+use crate::particle::{pores, strain};
 
 /// Names of the components of vectors and tensors, by their number, in the order of the files.
 pub(crate) const COMPONENTS: [&[&str]; 2] = [&["x", "y", "z"], &["xx", "yy", "zz", "xy", "yz", "xz"]];
@@ -250,15 +248,7 @@ fn contact_pressure<const D: usize>(view: &View<'_, D>, chunk: &Chunk<D>, p: usi
 
 /// Pressure of water that cannot leave the pores, since consolidation, Pa.
 fn excess_pore_pressure<const D: usize>(view: &View<'_, D>, chunk: &Chunk<D>, p: usize) -> f64 {
-    let material = usize::from(Tag::unpack(chunk.tags()[p]).material);
-    match view.water_moduli.get(material) {
-        Some(&modulus) if modulus > 0.0 => {
-            let [xx, yy, zz, xy, yz, xz] = symmetric(chunk, Layout::<D>::LEFT_CAUCHY_GREEN, p);
-            let history = chunk.read(Layout::<D>::HISTORY, p);
-            excess_pressure(modulus, &[xx, yy, zz, xy, xz, yz], &history)
-        }
-        _ => 0.0,
-    }
+    pores::excess_pressure(view.water_moduli, chunk, p)
 }
 
 /// Pressure of the water in the pores, Pa.
@@ -269,9 +259,8 @@ fn pore_pressure<const D: usize>(view: &View<'_, D>, chunk: &Chunk<D>, p: usize)
 /// Pressure of the water of `[water]`, Pa.
 fn given_pressure<const D: usize>(view: &View<'_, D>, chunk: &Chunk<D>, p: usize) -> f64 {
     let Some(ShownWater { water, since, gravity }) = &view.water else { return 0.0 };
-    let head = head(chunk, followed(view, chunk).head, p, &view.origin);
-    let place = in_job(&view.origin, &chunk.position(p));
-    water.about(head).pressure(place, view.time - since, gravity)
+    let carried = (followed(view, chunk).head, &view.origin);
+    pores::given_pressure(water, view.time - since, gravity, carried, chunk, p)
 }
 
 /// Total Cauchy stress, Pa: the effective one less the pressure of the water in the pores.
