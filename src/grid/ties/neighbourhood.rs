@@ -9,6 +9,9 @@ use crate::kernel::BLOCK;
 /// No leaf of the block's level: outside the domain, or on another level.
 const NO_LEAF: u32 = u32::MAX;
 
+/// Sets of cells or nodes of the blocks around a block, by offset number.
+pub(super) type Around = [u64; 27];
+
 /// Blocks and leaves around a block, by offset number.
 #[derive(Clone, Debug)]
 pub(super) struct Neighbourhood {
@@ -42,12 +45,32 @@ impl Neighbourhood {
         Self { blocks, leaves }
     }
 
-    /// Whether a cell is well filled, given the well filled cells of all known leaves; `None` where no leaf
-    /// of the level of the block has the cell. `place` counts cells from the lower corner of the block.
-    pub(super) fn is_filled<const D: usize>(&self, filled: &[u64], place: [i32; D]) -> Option<bool> {
+    /// Offset number of the block itself.
+    pub(super) const fn centre<const D: usize>() -> usize {
+        offset_count(D) / 2
+    }
+
+    /// The well filled cells around, given those of all known leaves.
+    pub(super) fn words(&self, filled: &[u64]) -> Around {
+        self.leaves.map(|leaf| if leaf == NO_LEAF { 0 } else { filled[leaf as usize] })
+    }
+
+    /// The sets of nodes around, given those of all blocks.
+    pub(super) fn of_blocks(&self, sets: &[u64]) -> Around {
+        self.blocks.map(|block| if block == NO_BLOCK { 0 } else { sets[block as usize] })
+    }
+
+    /// Whether a cell is well filled, given the well filled cells around; `None` where no leaf of the level
+    /// of the block has the cell. `place` counts cells from the lower corner of the block.
+    pub(super) fn is_filled<const D: usize>(&self, filled: &Around, place: [i32; D]) -> Option<bool> {
         let (index, bit) = split(place);
-        let leaf = self.leaves[index];
-        (leaf != NO_LEAF).then(|| filled[leaf as usize] >> bit & 1 == 1)
+        (self.leaves[index] != NO_LEAF).then(|| filled[index] >> bit & 1 == 1)
+    }
+
+    /// Whether sets of nodes around have the node at a place.
+    pub(super) fn has_node<const D: usize>(nodes: &Around, place: [i32; D]) -> bool {
+        let (index, bit) = split(place);
+        nodes[index] >> bit & 1 == 1
     }
 
     /// Number of the block, and bit, of the node at a place.

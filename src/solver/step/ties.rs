@@ -78,7 +78,7 @@ impl<const D: usize> Solver<D> {
         let Grid { fields, plan, inside_still, .. } = &mut self.grid;
         let still = &*inside_still;
         self.phases.time(Phase::Nodes, || {
-            ties.tie(plan, fields, |block, nodes| {
+            ties.tie(plan, field, fields, |block, nodes| {
                 let all = colliders.iter().map(|&(index, collider)| {
                     // The known nodes inside colliders that never move cover all real nodes.
                     let known = still.get(block).and_then(|of_block| of_block.get(index)?.as_ref());
