@@ -235,6 +235,8 @@ pub struct Scheme<'a> {
     /// Whether any particle of the run may have been halved (see [`crate::particle::halvings`]). If not, none
     /// is asked.
     pub has_halves: bool,
+    /// Whether the affine columns of particles hold stress, for forces on nodes.
+    pub forces: bool,
 }
 
 impl<'a> Scheme<'a> {
@@ -264,6 +266,7 @@ impl<'a> Scheme<'a> {
             shares: 0,
             elastic_stretch: boxes.greatest_stretch(),
             has_halves: false,
+            forces: false,
         }
     }
 

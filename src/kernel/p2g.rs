@@ -14,6 +14,9 @@
 //! X_a = wx_a q + wx_a dx_a C_x + wx'_a T_x,  Y_b = wy_b dy_b C_y + wy'_b T_y,  Z_c alike
 //! row = (wy_b wz_c) X_a + wx_a (wz_c Y_b + wy_b Z_c)
 //! ```
+//! With [`Scheme::forces`] the particles' affine columns hold a stress that need not be symmetric, in place of τ,
+//! and there is no affine momentum.
+//!
 //! In axisymmetry the hoop stress adds `-Δt V₀ τ_θθ T` to the momentum along the radius, with T the plain mean
 //! of the hat over the box, over the radius; it has a pass of its own.
 use super::batch::{Batch, Batches, Tile, lanes_in};
@@ -85,7 +88,7 @@ impl<const D: usize> Scatter<'_, D> {
             let tile = batch.tile::<D>(chunk.tiles(), 0..Layout::<D>::REALS, spare);
             prepared.weights.fill_parts(scheme.coordinates, frame, &batch.positions(tile), parts);
             let spread = std::array::from_fn(|axis| SubBox::lane(parts, |part| part.spread[axis]).to_array());
-            prepared.load::<Lanes>(tile, &batch, *dt, scheme.transfer, &spread);
+            prepared.load::<Lanes>(tile, &batch, *dt, scheme, &spread);
             prepared.share(parts);
             prepared.add::<Lanes>(&batch, arena);
             if prepared.weights.is_ring {
@@ -156,7 +159,7 @@ impl<const D: usize> WholeBoxes<'_, D> {
                     moments.nodes.add_spread(&prepared.weights, nodes, touched, &mut spread);
                 }
             }
-            prepared.load::<V>(tile, &batch, dt, scheme.transfer, &spread);
+            prepared.load::<V>(tile, &batch, dt, scheme, &spread);
             prepared.add::<V>(&batch, arena);
             if prepared.weights.is_ring {
                 prepared.add_hoop(tile, &batch, dt, |_| 1.0, arena);
@@ -194,9 +197,10 @@ impl<const D: usize> Prepared<D> {
         tile: &[[f64; LANES]],
         batch: &Batch,
         dt: f64,
-        transfer: Transfer,
+        scheme: &Scheme<'_>,
         spread: &[[f64; LANES]; D],
     ) {
+        let transfer = scheme.transfer;
         let zero = V::splat(0.0);
         let mass: V = batch.load(tile, Layout::<D>::MASS);
         let width = batch.load::<V>(tile, Layout::<D>::HALF) * 2.0;
@@ -213,12 +217,21 @@ impl<const D: usize> Prepared<D> {
         for k in 0..D {
             let factor = if transfer == Transfer::Apic { mass / V::load(&spread[k]) } else { mass };
             for i in 0..D {
-                column[i] = match transfer.has_affine() {
+                column[i] = match transfer.has_affine() && !scheme.forces {
                     true => batch.load::<V>(tile, Layout::<D>::AFFINE + D * i + k) * factor,
                     false => zero,
                 };
             }
             V::write_rows(column, &mut self.affine[k]);
+        }
+        if scheme.forces {
+            for k in 0..D {
+                for i in 0..D {
+                    column[i] = batch.load::<V>(tile, Layout::<D>::AFFINE + D * i + k) * volume;
+                }
+                V::write_rows(column, &mut self.impulse[k]);
+            }
+            return;
         }
         let mut stress = [zero; 6];
         for c in 0..Layout::<D>::SYMMETRIC {

@@ -102,3 +102,16 @@ pub fn update(materials: &[Box<dyn Material>], index: &[u16; LANES], state: &mut
         pending &= !bits;
     }
 }
+
+/// Tangents of a batch whose lane `i` is of material `index[i]`; `trial` is the state before the update.
+pub fn tangent(materials: &[Box<dyn Material>], index: &[u16; LANES], trial: &State, step: &Step) -> Tangent {
+    let mut all = materials[usize::from(index[0])].tangent(trial, step);
+    let mut pending = (0..LANES).filter(|&i| index[i] != index[0]).fold(0_u32, |bits, i| bits | 1 << i);
+    while pending != 0 {
+        let first = index[pending.trailing_zeros() as usize];
+        let bits = (0..LANES).filter(|&i| index[i] == first).fold(0, |bits, i| bits | 1 << i);
+        all = all.with_lanes(Mask::from_bits(bits), &materials[usize::from(first)].tangent(trial, step));
+        pending &= !bits;
+    }
+    all
+}

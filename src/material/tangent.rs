@@ -14,7 +14,7 @@
 use super::tensor::eigen::{Symmetric, decompose};
 use super::{Law, State, Step};
 use crate::simd::math::{exp, ln};
-use crate::simd::{Dual, Lanes, Vector, VectorMask};
+use crate::simd::{Dual, Lanes, Mask, Vector, VectorMask};
 
 /// Difference of logarithmic strains below which G is a derivative: there the difference has lost half its
 /// digits, and the derivative changes less.
@@ -83,6 +83,33 @@ impl Tangent {
         for entry in self.normal.iter_mut().flatten() {
             *entry += bulk;
         }
+        self
+    }
+
+    /// The one whose normal part is the mean of A and its transpose: of laws whose flow is not associated, for
+    /// solvers of symmetric systems.
+    pub fn symmetric(mut self) -> Self {
+        for [k, m] in PAIRS {
+            let mean = (self.normal[k][m] + self.normal[m][k]) * 0.5;
+            (self.normal[k][m], self.normal[m][k]) = (mean, mean);
+        }
+        self
+    }
+
+    /// Greatest stiffness along a principal direction, Pa.
+    pub fn greatest(&self) -> Lanes {
+        self.normal[0][0].max(self.normal[1][1]).max(self.normal[2][2])
+    }
+
+    /// That of `other` in the lanes of a mask, and this one in the others.
+    pub(super) fn with_lanes(mut self, mask: Mask, other: &Self) -> Self {
+        let all = |tangent: &mut Self, from: &Self| {
+            let own = tangent.directions.iter_mut().chain(&mut tangent.normal).flatten();
+            let own = own.chain(&mut tangent.shear);
+            let from = from.directions.iter().chain(&from.normal).flatten().chain(&from.shear);
+            own.zip(from).for_each(|(own, from)| *own = mask.select(*from, *own));
+        };
+        all(&mut self, other);
         self
     }
 

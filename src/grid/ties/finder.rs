@@ -13,8 +13,6 @@ pub(super) struct Finder<const D: usize> {
     rings: Vec<Vec<[i32; D]>>,
     /// Neighbourhood of each block, found on demand.
     around: Vec<Option<Box<Neighbourhood>>>,
-    /// Nodes of each block on faces of the domain.
-    on_faces: Vec<u64>,
     /// Zero for each node between two uses.
     sums: Vec<f64>,
 }
@@ -51,19 +49,14 @@ struct Known {
 }
 
 impl<const D: usize> Finder<D> {
-    pub(super) fn new(plan: &GridPlan<D>) -> Self {
-        let mut on_faces = vec![0; plan.blocks.len()];
-        let nodes = block_nodes(D);
-        plan.face_nodes
-            .iter()
-            .for_each(|&(node, _)| on_faces[node as usize / nodes] |= 1 << (node as usize % nodes));
-        Self { rings: rings(), around: Vec::new(), on_faces, sums: Vec::new() }
+    pub(super) fn new() -> Self {
+        Self { rings: rings(), around: Vec::new(), sums: Vec::new() }
     }
 
     /// Heap bytes held.
     pub(super) fn heap_bytes(&self) -> usize {
         let around = self.around.iter().flatten().count() * size_of::<Neighbourhood>();
-        around + size_of_val(&self.around[..]) + size_of_val(&self.on_faces[..]) + size_of_val(&self.sums[..])
+        around + size_of_val(&self.around[..]) + size_of_val(&self.sums[..])
     }
 
     /// Finds the ties of a velocity field, with those of the step before; see [`super::Ties::tie`].
@@ -92,7 +85,7 @@ impl<const D: usize> Finder<D> {
             .map(|block| match near[block] && fields.active[block] {
                 true => {
                     let moving = with_mass(fields, block, plan.blocks[block].real_nodes());
-                    moving & !self.on_faces[block] & !held(block, moving)
+                    moving & !held(block, moving)
                 }
                 false => 0,
             })

@@ -5,11 +5,11 @@ use crate::grid::sums::node_fields::NodeFields;
 
 /// A corner of a tied node.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Corner {
+pub struct Corner {
     /// Number of its row.
-    pub(super) node: usize,
+    pub node: usize,
     /// P_r.
-    pub(super) weight: f64,
+    pub weight: f64,
     /// `|P_r| S_r`.
     share: f64,
 }
@@ -30,7 +30,7 @@ struct Tie {
 
 /// Ties of a block or of a velocity field.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Tied {
+pub struct Tied {
     /// Block by block.
     ties: Vec<Tie>,
     /// Tie by tie.
@@ -62,6 +62,11 @@ impl Tied {
         self.corners.extend_from_slice(&block.corners);
     }
 
+    /// Each tied node with its corners, in the order of their places.
+    pub fn iter(&self) -> impl IndexedParallelIterator<Item = (usize, &[Corner])> {
+        (0..self.ties.len()).into_par_iter().with_min_len(256).map(|number| self.get(number))
+    }
+
     /// Finds what each corner bears of all ties. `sums` is zero for all rows, before and after.
     pub(super) fn share_out(&mut self, sums: &mut [f64]) {
         self.corners.iter().for_each(|corner| sums[corner.node] += corner.weight.abs());
@@ -78,10 +83,9 @@ impl Tied {
     /// Applies the impulses of a sweep to the nodes, whose rows hold velocities and masses.
     pub(super) fn pull<const D: usize>(&self, fields: &mut NodeFields<D>) {
         let rows = &mut fields.rows;
-        let ties = (0..self.ties.len()).into_par_iter().with_min_len(256);
-        let impulses: Vec<[f64; D]> = ties
-            .map(|number| {
-                let (node, corners) = self.get(number);
+        let impulses: Vec<[f64; D]> = self
+            .iter()
+            .map(|(node, corners)| {
                 let own = &rows[node].0;
                 let (mut compliance, mut plane) = (1.0 / own[3], [0.0; D]);
                 for Corner { node, weight, share } in corners {

@@ -31,7 +31,9 @@ mod plane;
 use partition::comm::{Comm, Traffic};
 
 use self::finder::{Finder, Memory};
+pub use self::impulses::Tied;
 use self::leaf_words::LeafWords;
+use super::mask::block_nodes;
 use super::plan::GridPlan;
 use super::sums::node_fields::NodeFields;
 
@@ -46,6 +48,8 @@ pub struct Ties<const D: usize> {
     /// Well filled cells of each known leaf.
     filled: Vec<u64>,
     finder: Finder<D>,
+    /// Nodes of each block on faces of the domain.
+    on_faces: Vec<u64>,
     /// By velocity field.
     memories: Vec<Memory>,
 }
@@ -53,8 +57,13 @@ pub struct Ties<const D: usize> {
 impl<const D: usize> Ties<D> {
     /// Collective. For a plan that has a [`HALO`].
     pub fn new(comm: &Comm, plan: &GridPlan<D>) -> Self {
-        let words = LeafWords::new(comm, &plan.tree);
-        Self { words, filled: Vec::new(), finder: Finder::new(plan), memories: Vec::new() }
+        let mut on_faces = vec![0; plan.blocks.len()];
+        let nodes = block_nodes(D);
+        plan.face_nodes
+            .iter()
+            .for_each(|&(node, _)| on_faces[node as usize / nodes] |= 1 << (node as usize % nodes));
+        let (words, finder) = (LeafWords::new(comm, &plan.tree), Finder::new());
+        Self { words, filled: Vec::new(), finder, on_faces, memories: Vec::new() }
     }
 
     /// Messages and bytes so far.
@@ -65,7 +74,7 @@ impl<const D: usize> Ties<D> {
     /// Heap bytes held.
     pub fn heap_bytes(&self) -> usize {
         let memories = self.memories.iter().map(Memory::heap_bytes).sum::<usize>();
-        size_of_val(&self.filled[..]) + self.finder.heap_bytes() + memories
+        size_of_val(&self.filled[..]) + size_of_val(&self.on_faces[..]) + self.finder.heap_bytes() + memories
     }
 
     /// Collective over neighbours. Takes the well filled cells of each own leaf, a bit each.
@@ -86,7 +95,23 @@ impl<const D: usize> Ties<D> {
         if self.memories.len() <= field {
             self.memories.resize_with(field + 1, Memory::default);
         }
-        self.finder.find(plan, fields, &self.filled, &mut self.memories[field], held);
-        self.memories[field].tied.pull(fields);
+        let memory = &mut self.memories[field];
+        let on_faces = &self.on_faces;
+        self.finder
+            .find(plan, fields, &self.filled, memory, |block, nodes| on_faces[block] | held(block, nodes));
+        memory.tied.pull(fields);
+    }
+
+    /// Not collective. The ties of a velocity field, whose rows hold masses; `held` as in [`Ties::tie`], where
+    /// nodes on faces of the domain are not fixed for that alone.
+    pub fn search(
+        &mut self,
+        plan: &GridPlan<D>,
+        fields: &NodeFields<D>,
+        held: impl Fn(usize, u64) -> u64 + Sync,
+    ) -> Tied {
+        let mut memory = Memory::default();
+        self.finder.find(plan, fields, &self.filled, &mut memory, held);
+        memory.tied
     }
 }

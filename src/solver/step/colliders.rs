@@ -13,7 +13,7 @@ use crate::solver::state::phases::Phase;
 
 /// Impulse of one node or particle on a collider.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Touch<const D: usize> {
+pub(in crate::solver) struct Touch<const D: usize> {
     pub collider: usize,
     pub position: [f64; D],
     pub impulse: [f64; D],
@@ -21,7 +21,7 @@ pub(super) struct Touch<const D: usize> {
 
 impl<const D: usize> Touch<D> {
     /// Adds impulse and angular impulse about the reference point to the sums of the collider.
-    pub(super) fn book(
+    pub(in crate::solver) fn book(
         &self,
         colliders: &[Collider<D>],
         states: &[ColliderState<D>],
@@ -59,7 +59,7 @@ impl<const D: usize> Solver<D> {
     }
 
     /// Sums of 0 for each collider.
-    pub(super) fn no_impulses(&self) -> Vec<[ExactSum; SUMS]> {
+    pub(in crate::solver) fn no_impulses(&self) -> Vec<[ExactSum; SUMS]> {
         vec![std::array::from_fn(|_| ExactSum::new()); self.physics.colliders.len()]
     }
 

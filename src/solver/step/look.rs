@@ -9,7 +9,7 @@ use crate::solver::sorting::bin_view::BinView;
 use crate::solver::sorting::leaf_bins::LeafBins;
 
 /// Input of the gather, the same for all leaves.
-pub(super) struct Look<'a, const D: usize> {
+pub(in crate::solver) struct Look<'a, const D: usize> {
     pub plan: &'a GridPlan<D>,
     /// Velocities of the nodes.
     pub fields: &'a NodeFields<D>,
@@ -20,7 +20,7 @@ pub(super) struct Look<'a, const D: usize> {
 impl<const D: usize> Look<'_, D> {
     /// Calls `each` with the particles of an own leaf and their gathered values: bin by bin those whose boxes
     /// are whole, then those whose boxes are cut. `kernel`, `arena` and `gathered` are memory of the thread.
-    pub(super) fn at_leaf(
+    pub(in crate::solver) fn at_leaf(
         &self,
         (kernel, arena, gathered): (&mut g2p::Scratch<D>, &mut VelocityArena<D>, &mut Vec<Gathered<D>>),
         lists: Option<&LeafBins<D>>,

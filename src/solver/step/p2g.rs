@@ -113,7 +113,7 @@ impl<const D: usize> Solver<D> {
 }
 
 /// Scatters mass, affine momentum and the impulse of stress of the members of a bin into its arena.
-pub(super) fn scatter<const D: usize>(
+pub(in crate::solver) fn scatter<const D: usize>(
     scratch: &mut p2g::Scratch<D>,
     bin: &BinView<'_, D>,
     chunks: &[Chunk<D>],

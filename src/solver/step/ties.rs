@@ -4,6 +4,7 @@ use rayon::prelude::*;
 
 use crate::boundary::Collider;
 use crate::grid::leaf_geometry::{LeafCells, leaf_box};
+use crate::grid::ties::Ties;
 use crate::kernel::BLOCK;
 use crate::particle::Chunk;
 use crate::particle::chunk::{Layout, TILE};
@@ -53,20 +54,7 @@ impl<const D: usize> Solver<D> {
     /// and inside colliders follow these.
     pub(super) fn tie_surface(&mut self, field: usize) {
         let Some(mut ties) = self.grid.ties.take() else { return };
-        let group = self.physics.group(field);
-        let plan = &self.grid.plan;
-        let leaves = self.chunks.par_iter().zip(self.forest.leaves()).with_min_len(16);
-        let own: Vec<u64> = self.phases.time(Phase::Nodes, || {
-            let filled = leaves.map(|(chunk, leaf)| match chunk.is_empty() {
-                true => 0,
-                false => {
-                    let cells = LeafCells::new(&leaf_box(leaf, plan.root_edge));
-                    well_filled(chunk, &cells, plan.cell(leaf.level).powi(D as i32), group.as_ref())
-                }
-            });
-            filled.collect()
-        });
-        self.phases.time(Phase::Exchange, || ties.fill(plan, &own));
+        self.fill_cells(&mut ties, field);
         let colliders: Vec<(usize, &Collider<D>)> = self
             .physics
             .colliders
@@ -94,5 +82,23 @@ impl<const D: usize> Solver<D> {
             });
         });
         self.grid.ties = Some(ties);
+    }
+
+    /// Collective over neighbours. Tells the ties which cells the particles of a velocity field fill well.
+    pub(in crate::solver) fn fill_cells(&mut self, ties: &mut Ties<D>, field: usize) {
+        let group = self.physics.group(field);
+        let plan = &self.grid.plan;
+        let leaves = self.chunks.par_iter().zip(self.forest.leaves()).with_min_len(16);
+        let own: Vec<u64> = self.phases.time(Phase::Nodes, || {
+            let filled = leaves.map(|(chunk, leaf)| match chunk.is_empty() {
+                true => 0,
+                false => {
+                    let cells = LeafCells::new(&leaf_box(leaf, plan.root_edge));
+                    well_filled(chunk, &cells, plan.cell(leaf.level).powi(D as i32), group.as_ref())
+                }
+            });
+            filled.collect()
+        });
+        self.phases.time(Phase::Exchange, || ties.fill(plan, &own));
     }
 }
