@@ -20,7 +20,7 @@ use crate::particle::followed::Followed;
 use crate::particle::given::Given;
 use crate::probe::{Flux, Line, Map, Probe, Track};
 use crate::quantity::{Quantity, in_job};
-use crate::solver::Equilibrium;
+use crate::solver::{Equilibrium, QuasiStatic};
 use crate::source::Source;
 use partition::{Brick, Octant};
 use std::path::PathBuf;
@@ -167,6 +167,8 @@ pub struct Problem<const D: usize> {
     pub f_bar: bool,
     /// Artificial viscosity, if there is any.
     pub viscosity: Option<Viscosity>,
+    /// Load steps in place of time steps; `None`: none.
+    pub quasi_static: Option<QuasiStatic>,
     /// Whether surface nodes are tied.
     pub tied_surfaces: bool,
     /// Output files.

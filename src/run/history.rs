@@ -9,6 +9,7 @@ use crate::job::Problem;
 use crate::material::Failed;
 use crate::probe;
 use crate::setup;
+use crate::solver::Effort;
 use crate::solver::diagnostics::totals::{GridTotals, ParticleTotals};
 use crate::solver::migration::crossings::Crossings;
 use crate::solver::state::bookings::{FAILED_SUMS, ForceAndWork, Reaction, SOURCE_SUMS};
@@ -60,6 +61,9 @@ pub fn columns<const D: usize>(problem: &Problem<D>) -> Vec<(String, &'static st
     }
     if problem.has_equilibrium() {
         columns.extend(RELAXATION.map(|(name, unit)| (name.to_owned(), unit)));
+    }
+    if problem.quasi_static.is_some() {
+        columns.extend(EFFORT.map(|name| (name.to_owned(), "")));
     }
     if problem.stages.len() > 1 {
         columns.push(("stage".to_owned(), ""));
@@ -150,6 +154,15 @@ const RELAXATION: [(&str, &str); 3] =
 /// The values of a row for the progress towards equilibrium.
 pub fn relaxation_values(relaxation: &Relaxation) -> [f64; RELAXATION.len()] {
     [relaxation.speed, relaxation.acceleration, relaxation.stops as f64]
+}
+
+/// Columns of runs with load steps.
+const EFFORT: [&str; 4] = ["newton_iterations", "linear_iterations", "unbalanced_force", "cuts"];
+
+/// The values of a row for the last load step.
+pub fn effort_values(effort: &Effort) -> [f64; EFFORT.len()] {
+    let Effort { newton, linear, residual, cuts } = *effort;
+    [newton.into(), linear.into(), residual, cuts.into()]
 }
 
 /// The values of a row for splits and merges.

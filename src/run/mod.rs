@@ -376,7 +376,9 @@ impl<'a, const D: usize> Run<'a, D> {
 
     fn step(&mut self, requests: Requests) -> Result<StepReport, RunError> {
         let clock = self.solver.clock;
-        let end = if clock.bound.is_finite() { f64::INFINITY } else { self.next_event() };
+        // Load steps end where something is due, so that it shows the loads of its time.
+        let is_free = clock.bound.is_finite() && self.solver.physics.quasi_static.is_none();
+        let end = if is_free { f64::INFINITY } else { self.next_event() };
         let report = self.solver.step(end, requests);
         report.map_err(|source| RunError::Step { step: clock.step, time: clock.time, source })
     }

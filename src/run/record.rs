@@ -285,6 +285,9 @@ impl<'a, const D: usize> Recorder<'a, D> {
                 seeks.then_some(&solver.relaxation).map_or([f64::NAN; 3], history::relaxation_values),
             );
         }
+        if self.problem.quasi_static.is_some() {
+            values.extend(history::effort_values(&solver.effort));
+        }
         if self.problem.stages.len() > 1 {
             values.push((solver.physics.stage() + 1) as f64);
         }

@@ -51,6 +51,7 @@ fn constant_physics<const D: usize>(problem: &Problem<D>) -> Physics<D> {
         adaptivity: problem.adaptivity.clone(),
         leaving: problem.leaving,
         equilibrium: None,
+        quasi_static: problem.quasi_static,
         fill_densities: Vec::new(),
         meets: Vec::new(),
         transfer: problem.transfer,
@@ -60,7 +61,7 @@ fn constant_physics<const D: usize>(problem: &Problem<D>) -> Physics<D> {
         has_halves: false,
         f_bar: problem.f_bar,
         viscosity: problem.viscosity,
-        ties: problem.tied_surfaces,
+        ties: problem.tied_surfaces || problem.quasi_static.is_some(),
         followed: problem.output.followed,
         control: StepControl {
             cfl: problem.time.cfl,

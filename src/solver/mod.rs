@@ -11,6 +11,7 @@
 //! | [`state`] | the solver and what it owns |
 //! | [`step`] | phases of a step |
 //! | `seepage` | heads of water that seeps |
+//! | `quasi_static` | load steps: equilibrium by Newton's method |
 //! | [`refinement`] | dynamic refinement |
 //! | [`balance`] | load balance: measured costs, new partitions |
 //! | [`stage`] | the next stage of a run |
@@ -19,6 +20,7 @@ pub mod balance;
 pub mod diagnostics;
 pub mod migration;
 pub mod physics;
+mod quasi_static;
 pub mod refinement;
 mod seepage;
 pub mod sorting;
@@ -26,8 +28,8 @@ pub mod stage;
 pub mod state;
 pub mod step;
 
-pub use physics::{Equilibrium, Physics, StepControl};
-pub use state::{Clock, Requests, Solver, StepError, StepReport};
+pub use physics::{Equilibrium, Physics, QuasiStatic, StepControl};
+pub use state::{Clock, Effort, Requests, Solver, StepError, StepReport};
 
 use partition::Forest;
 use partition::comm::{Comm, Disagreement, Traffic};
@@ -85,6 +87,8 @@ impl<const D: usize> Solver<D> {
             conveyed: Vec::new(),
             pushes: Vec::new(),
             near: Vec::new(),
+            effort: Effort::default(),
+            next_load_step: 0.0,
             relaxation: Relaxation::default(),
             motion: Default::default(),
             physics,
@@ -110,6 +114,9 @@ impl<const D: usize> Solver<D> {
             has_wide: false,
             pieces_before: Vec::new(),
         };
+        if let Some(load_steps) = solver.physics.quasi_static {
+            solver.next_load_step = if clock == Clock::default() { load_steps.step } else { clock.bound };
+        }
         solver.physics.has_halves = solver.find_halves();
         solver.leaf_data.reset(solver.chunks.len());
         solver.ledger.next_root = solver.first_free_root();
@@ -155,7 +162,14 @@ impl<const D: usize> Solver<D> {
         self.leaf_data.begin_step(self.clock.step, self.chunks.len());
         self.weigh_particles();
         let lengths = Lengths::new(self.caught_up_lag(), dt);
-        let advanced = self.advance(to, lengths);
+        let (to, dt, advanced) = match self.physics.quasi_static {
+            None => (to, dt, self.advance(to, lengths)),
+            Some(_) => {
+                let (whole, start) = (dt, self.clock.time);
+                let (dt, advanced) = self.load_step(dt);
+                (if dt < whole { start + dt } else { to }, dt, advanced)
+            }
+        };
         (self.clock.step, self.clock.time, self.clock.dt) = (self.clock.step + 1, to, dt);
         let settled = self.relax(lengths);
         self.weigh_nodes();
@@ -192,6 +206,7 @@ impl<const D: usize> Solver<D> {
     /// and where velocities have been set since.
     pub fn lag(&self) -> f64 {
         match self.relaxation.phase {
+            _ if self.physics.quasi_static.is_some() => 0.0,
             RelaxPhase::Stopped => 0.0,
             _ => 0.5 * self.clock.dt,
         }

@@ -65,6 +65,8 @@ pub struct Physics<const D: usize> {
     pub meets: Vec<Meets>,
     /// Equilibrium at which the stage ends, and to which kinetic damping leads; `None`: neither.
     pub equilibrium: Option<Equilibrium>,
+    /// Load steps to equilibrium in place of time steps; `None`: none.
+    pub quasi_static: Option<QuasiStatic>,
     /// How particle boxes follow the deformation.
     pub boxes: BoxPolicy,
     /// How elastic bodies hold together that are stretched; `None`: their particles are not halved.
@@ -94,6 +96,17 @@ pub struct Equilibrium {
     /// with four times the mass, so that all levels have the same longest step. `None`: all moves with its
     /// own.
     pub own_mass_level: Option<u8>,
+}
+
+/// Load steps.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct QuasiStatic {
+    /// Longest step, s; also the first.
+    pub step: f64,
+    /// Length below which a step that fails ends the run, s.
+    pub least_step: f64,
+    /// Greatest unbalanced force, over that of loads or stress.
+    pub tolerance: f64,
 }
 
 /// Limits on the time step.

@@ -33,6 +33,7 @@ mod paraview;
 mod particles;
 mod pictures;
 mod probes;
+mod quasi_static;
 mod report;
 mod rigid_contact;
 mod rings;

@@ -147,7 +147,8 @@ pub(in crate::cli) fn write<const D: usize>(
         bytes(estimate.memory_per_rank(ranks)),
         plural(ranks)
     )?;
-    writeln!(out, "time step    about {}", quantity(estimate.time_step, "s"))?;
+    let kind = if problem.quasi_static.is_some() { "load step    at most" } else { "time step    about" };
+    writeln!(out, "{kind} {}", quantity(estimate.time_step, "s"))?;
     let (steps, end) = (number(estimate.steps, 4), quantity(problem.time.end, "s"));
     writeln!(out, "steps        about {steps} to {end}")?;
     let cores = std::thread::available_parallelism().map_or(1, usize::from) as u32;

@@ -4,6 +4,7 @@
 //! | file | subject |
 //! |---|---|
 //! | `checks` | state that all share: faults with their places, the domain |
+//! | `quasi_static` | load steps, and what jobs with them cannot have |
 //! | `settings` | faces, numerics, output, report |
 //! | `shapes` | shapes, among them terrain, and particles from a file |
 //! | `adaptivity` | dynamic refinement |
@@ -53,6 +54,7 @@ mod loads;
 mod overlap;
 mod probes;
 mod quantities;
+mod quasi_static;
 pub(super) mod settings;
 mod shapes;
 mod sources;
@@ -227,6 +229,7 @@ fn problem<const D: usize>(
         boxes,
         f_bar: file.numerics.f_bar,
         viscosity: settings::viscosity(&file.numerics),
+        quasi_static: quasi_static::settings(checks, file, &root),
         tied_surfaces: file.numerics.tied_surfaces,
         output,
         checkpoint: CheckpointSetup {
@@ -245,6 +248,7 @@ fn problem<const D: usize>(
         telemetry_every: file.telemetry.every_steps,
         report,
     };
+    quasi_static::check(checks, file, &problem);
     for overlap in overlap::find(&problem) {
         let [first, second] = overlap.bodies.map(|body| excerpt(&problem.bodies[body].name, QUOTED));
         let point = space.words(&overlap.point);

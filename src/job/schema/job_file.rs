@@ -92,6 +92,9 @@ pub struct JobFile {
     /// Run to equilibrium; none by default. In a job with stages, set it in the stages.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub equilibrium: Option<Equilibrium>,
+    /// Load steps to equilibrium in place of time steps; none by default.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub quasi_static: Option<QuasiStatic>,
     /// Stages of the run; one without changes by default.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     #[schemars(length(max = 20))]
@@ -452,6 +455,28 @@ pub struct Equilibrium {
     /// same; the motion before it is not physical.
     #[serde(default)]
     pub mass_scaling: bool,
+}
+
+/// Load steps: at the end of each, the forces on all nodes balance (Newton's method). Velocities are 0, and the time of the job orders
+/// loads and motions. Steps end where an output, a stage or the run does.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct QuasiStatic {
+    /// Longest load step, s; also the first. Steps become shorter where the iteration fails, and longer again after.
+    #[schemars(range(max = 1e12), extend("exclusiveMinimum" = 0.0))]
+    pub step: f64,
+    /// Shortest load step, s: one that fails ends the run; `step / 1024` by default.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(range(max = 1e12), extend("exclusiveMinimum" = 0.0))]
+    pub min_step: Option<f64>,
+    /// Bound on the unbalanced force, over the force of loads or of stress, whichever is greater (norms over all nodes).
+    #[serde(default = "default_tolerance")]
+    #[schemars(range(max = 0.1), extend("exclusiveMinimum" = 1e-12))]
+    pub tolerance: f64,
+}
+
+fn default_tolerance() -> f64 {
+    1e-6
 }
 
 /// Numerical method.

@@ -253,6 +253,9 @@ fn closing_speed<const D: usize>(problem: &Problem<D>) -> f64 {
 /// Courant condition over the fastest wave and the fastest particle at the start, on the finest cells. With
 /// artificial viscosity waves count as it damps them while bodies meet.
 fn time_step<const D: usize>(problem: &Problem<D>, finest: u8) -> f64 {
+    if let Some(load_steps) = problem.quasi_static {
+        return load_steps.step;
+    }
     let jump = problem.viscosity.map_or(0.0, |_| JUMP * closing_speed(problem));
     let wave = problem
         .bodies

@@ -46,7 +46,7 @@ pub(super) fn look<const D: usize>(problem: &Problem<D>, steps: f64, all: &mut V
     }
     tools(problem, &materials, all);
     loads(problem, &materials, all);
-    if steps < STEPS {
+    if steps < STEPS && problem.quasi_static.is_none() {
         all.push(format!(
             "time: the run takes about {}; expected at least {STEPS}: check time.end, and the units of stiffness and density (Pa, kg/m³)",
             counted(steps.max(1.0) as u64, "step")

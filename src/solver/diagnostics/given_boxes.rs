@@ -90,6 +90,7 @@ impl<const D: usize> GivenBoxes<D> {
         let elastic = parameters::Elastic { young: 1.0, poisson: 0.0 };
         let physics = Physics {
             equilibrium: None,
+            quasi_static: None,
             fill_densities: Vec::new(),
             meets: Vec::new(),
             origin: [0.0; D],

@@ -68,6 +68,30 @@ pub enum StepError {
         /// The time step, s.
         dt: f64,
     },
+    /// Forces of a load step do not balance.
+    #[error(
+        "no equilibrium at t = {to} s, in a load step of {dt} s, the shortest: after {newton} Newton and {linear} linear iterations {residual:.1e} of the forces were not balanced; expected loads that the material can bear, or a smaller quasi_static.min_step"
+    )]
+    NoBalance {
+        /// Time at the end of the step, s.
+        to: f64,
+        /// Length of the step, s.
+        dt: f64,
+        /// Newton iterations.
+        newton: u32,
+        /// Iterations of linear systems.
+        linear: u32,
+        /// Unbalanced force over that of loads or stress.
+        residual: f64,
+    },
+    /// Material of a quasi-static job has come to a face that only bears pressure.
+    #[error(
+        "material has reached the face boundaries.{}_{}, which is separating; expected sticky, slip or symmetric faces where material rests in a quasi-static job", ["x", "y", "z"][face / 2], ["min", "max"][face % 2]
+    )]
+    Face {
+        /// The face: `2 axis`, one more for the upper.
+        face: usize,
+    },
     /// The time after the step is not finite, or no later than that before it.
     #[error("a step of {dt} s from t = {from} s would end at t = {to} s; expected a later, finite time")]
     Time {
@@ -91,6 +115,19 @@ pub struct Clock {
     pub dt: f64,
     /// Bound on the next step from the state of all particles, s.
     pub bound: f64,
+}
+
+/// How a load step went.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Effort {
+    /// Newton iterations.
+    pub newton: u32,
+    /// Iterations of linear systems.
+    pub linear: u32,
+    /// Unbalanced force over that of loads or stress, whichever is greater.
+    pub residual: f64,
+    /// Attempts at the step that were given up.
+    pub cuts: u32,
 }
 
 /// Results of a step, on this rank.
@@ -168,6 +205,10 @@ pub struct Solver<const D: usize> {
     pub(super) pushes: Vec<Vec<ParticlePush<D>>>,
     /// Particles near colliders that act on particles, by own leaf; empty without such colliders.
     pub(super) near: Vec<Vec<Near<D>>>,
+    /// How the last load step went.
+    pub effort: Effort,
+    /// Length of the next load step, s, unless something is due earlier.
+    pub(super) next_load_step: f64,
     /// Progress of kinetic damping towards equilibrium.
     pub relaxation: Relaxation,
     /// Kinetic energy (J) and mass (kg) of the nodes of this rank in the last step, in jobs that ask for

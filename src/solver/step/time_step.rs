@@ -12,6 +12,11 @@ impl<const D: usize> Solver<D> {
     /// Length of the next step: the bound from all particles, the job's limits, and `limit`.
     pub(in crate::solver) fn choose_dt(&self, limit: f64) -> f64 {
         let control = &self.physics.control;
+        if self.physics.quasi_static.is_some() {
+            // Equal steps up to what is due, and none that only rounding has left over.
+            let bound = self.clock.bound.min(control.dt_max.unwrap_or(f64::INFINITY));
+            return limit / (limit / bound - 1e-9).ceil().max(1.0);
+        }
         let bound = if self.clock.bound.is_finite() { self.clock.bound } else { self.free_bound() };
         let bound = bound.min(self.physics.source_bound(self.clock.time));
         let mut dt = bound.min(control.dt_max.unwrap_or(f64::INFINITY));
@@ -27,6 +32,9 @@ impl<const D: usize> Solver<D> {
     /// of a cell, `g Δt² ≤ cfl h`. Colliders bound the step as well. With mass scaling by s, waves and falls
     /// are slower by √s.
     pub(in crate::solver) fn local_bound(&self) -> f64 {
+        if self.physics.quasi_static.is_some() {
+            return self.next_load_step;
+        }
         let plan = &self.grid.plan;
         // Scaled so that no square overflows.
         let gravity = self.physics.gravity.at(self.clock.time);

@@ -1,0 +1,245 @@
+//! Load steps: equilibrium at the end of each step, by Newton's method.
+//!
+//! In a quasi-static job all velocities are 0 between steps, and time orders loads and motions. A step finds the
+//! displacements of nodes with which forces balance at its end (updated Lagrangian; Charlton, Coombs and
+//! Augarde 2017); then particles take on what they gather from these, as in any step. A step in which
+//! the iteration fails is done again with half its length.
+//!
+//! | file | what it holds |
+//! |---|---|
+//! | `unknowns` | nodes, what holds them, ties, products |
+//! | `points` | stress and tangent of the particles |
+//! | `skyline` | factors of a symmetric matrix |
+//! | `coarse` | preconditioner: leaves as elements |
+//! | `newton` | the iteration |
+//! | this | a step |
+mod coarse;
+mod newton;
+mod points;
+mod skyline;
+mod unknowns;
+
+use self::newton::MOST_WAY;
+use self::unknowns::{Holder, Nodal, Unknowns};
+use super::step::colliders::Touch;
+use crate::boundary::Contact;
+use crate::boundary::motion::Rate;
+use crate::exact_sum::ExactSum;
+use crate::kernel::Row;
+use crate::leapfrog::Lengths;
+use crate::load::{Kind, Load};
+use crate::particle::chunk::{Chunk, Layout};
+use crate::solver::migration::migrate::Moved;
+use crate::solver::state::bookings::SUMS;
+use crate::solver::state::{Effort, Solver, StepError};
+use crate::solver::step::relax::stop;
+
+/// Growth of steps that converge fast.
+const GROWTH: f64 = 1.5;
+/// Part of the greatest way of a node in a step for which the next step is made.
+const NEARLY: f64 = 0.9;
+/// Newton iterations up to which convergence is fast.
+const FAST: u32 = 6;
+
+impl<const D: usize> Solver<D> {
+    /// Collective. A load step from the present time of at most `dt`, s. Returns its length, and what has moved
+    /// or why the step failed.
+    pub(in crate::solver) fn load_step(&mut self, dt: f64) -> (f64, Result<Moved, StepError>) {
+        let Some(settings) = self.physics.quasi_static else { return (dt, Ok(Moved::default())) };
+        self.chunks.iter_mut().for_each(stop);
+        let sorted = self.sort_into_bins();
+        if self.comm.any(sorted.is_err()) {
+            return (dt, sorted.map(|()| Moved::default()).map_err(Into::into));
+        }
+        let (mut dt, mut cuts) = (dt, 0);
+        let masses: Vec<Vec<f64>> = self
+            .chunks
+            .iter()
+            .map(|chunk| chunk.column(Layout::<D>::MASS).into_iter().copied().collect())
+            .collect();
+        loop {
+            let rates = self.collider_rates(dt);
+            let (unknowns, outer, pulls) = self.outer_forces(&rates, dt);
+            if let Some(face) = self.open_face(&unknowns) {
+                return (dt, Err(StepError::Face { face }));
+            }
+            let found = self.balance_forces(&unknowns, &outer, dt, settings.tolerance);
+            restore_masses(&mut self.chunks, &masses);
+            match found {
+                Ok(balance) => {
+                    let effort = Effort { cuts, ..balance.effort };
+                    self.effort = effort;
+                    let bound = if cuts > 0 { dt } else { self.next_load_step };
+                    let is_fast = effort.newton <= FAST;
+                    let grown = if is_fast { GROWTH * bound } else { bound };
+                    // Nodes of a longer step than the next may move too far.
+                    let far = self.comm.max_f64(unknowns.greatest_way(&balance.way));
+                    let allowed = if far > 0.0 { NEARLY * MOST_WAY / far * dt } else { f64::INFINITY };
+                    self.next_load_step = grown.min(allowed).min(settings.step);
+                    let impulses = self.book(&unknowns, &balance.rest, &balance.way, &pulls, dt);
+                    return (dt, self.follow(&unknowns, &balance.way, &rates, impulses, dt));
+                }
+                Err(effort) => {
+                    cuts += 1;
+                    dt *= 0.5;
+                    if dt < settings.least_step {
+                        let Effort { newton, linear, residual, .. } = effort;
+                        let to = self.clock.time + 2.0 * dt;
+                        return (
+                            dt,
+                            Err(StepError::NoBalance { to, dt: 2.0 * dt, newton, linear, residual }),
+                        );
+                    }
+                }
+            }
+        }
+    }
+
+    /// Collective over neighbours. Unknowns of a step, and the forces of loads and gravity at its end; also
+    /// accelerations by loads at nodes, for their sums: load, node and force.
+    fn outer_forces(
+        &mut self,
+        rates: &[Rate<D>],
+        dt: f64,
+    ) -> (Unknowns<D>, Nodal<D>, Vec<(usize, usize, [f64; D])>) {
+        // The force over 1 s at the end of the step is an impulse.
+        let at_end = Lengths { kick: 1.0, drift: 2.0f64.mul_add(dt, 1.0) };
+        self.chunks.iter_mut().for_each(forget_stress);
+        let pushed = self.push_particles(at_end);
+        let fields = Unknowns::empty();
+        let _ = self.forces(&fields, |_, _| ());
+        self.take_back_push(&pushed);
+        let unknowns = self.unknowns(rates, dt);
+        let gravity = self.physics.gravity.at(self.clock.time + dt);
+        let loads = self.physics.loads.iter().enumerate();
+        let active: Vec<(usize, &Load<D>)> = loads
+            .filter(|(_, load)| {
+                let is_force = matches!(load.kind, Kind::BodyForce(_)) && !load.acts_on_particles(false);
+                is_force && load.is_active(self.clock.time)
+            })
+            .collect();
+        let mut pulls = Vec::new();
+        let mut outer = Vec::with_capacity(unknowns.nodes.len());
+        for (number, (&node, x)) in unknowns.nodes.iter().zip(&unknowns.places).enumerate() {
+            let Row(row) = self.grid.fields.rows[node as usize];
+            let mut force: [f64; D] = std::array::from_fn(|a| row[3].mul_add(gravity[a], row[a]));
+            for &(load, at) in active.iter().filter(|(_, load)| load.reaches(x)) {
+                let mut acceleration = [0.0; D];
+                at.apply(&mut acceleration, x, self.clock.time, at_end);
+                let pull = acceleration.map(|a| row[3] * a);
+                (0..D).for_each(|a| force[a] += pull[a]);
+                pulls.push((load, number, pull));
+            }
+            outer.push(force);
+        }
+        (unknowns, outer, pulls)
+    }
+
+    /// The first face of the domain that material has reached and that gives no support which a load step
+    /// knows, as a number; on any rank.
+    fn open_face(&self, unknowns: &Unknowns<D>) -> Option<usize> {
+        let mut found = f64::INFINITY;
+        for &node in &unknowns.nodes {
+            let on = self.grid.plan.faces_at(node as usize);
+            for face in (0..2 * D).filter(|face| on >> face & 1 == 1) {
+                if matches!(self.physics.faces[face / 2][face % 2], Contact::Separating { .. }) {
+                    found = found.min(face as f64);
+                }
+            }
+        }
+        let found = self.comm.min_f64(found);
+        found.is_finite().then_some(found as usize)
+    }
+
+    /// Not collective. Adds the impulses of the step to the sums of loads, colliders and faces. Returns those
+    /// on the colliders.
+    fn book(
+        &mut self,
+        unknowns: &Unknowns<D>,
+        rest: &Nodal<D>,
+        way: &Nodal<D>,
+        pulls: &[(usize, usize, [f64; D])],
+        dt: f64,
+    ) -> Vec<[ExactSum; SUMS]> {
+        let mut impulses = self.no_impulses();
+        for &(load, number, force) in pulls.iter().filter(|(_, number, _)| unknowns.owned[*number]) {
+            let sums = &mut self.load_sums.of[load];
+            for a in 0..D {
+                sums[a].add(dt * force[a]);
+                sums[3].add(force[a] * way[number][a]);
+            }
+        }
+        for (number, held) in unknowns.held.iter().enumerate().filter(|(number, _)| unknowns.owned[*number]) {
+            let mut last = None;
+            for held in held.iter().flatten().filter(|held| last.replace(held.by) != Some(held.by)) {
+                let is_by = |a: usize| unknowns.held[number][a].is_some_and(|other| other.by == held.by);
+                // The node gets the opposite of the force that is left.
+                let on_holder: [f64; D] =
+                    std::array::from_fn(|a| if is_by(a) { dt * rest[number][a] } else { 0.0 });
+                match held.by {
+                    Holder::Grip(load) => {
+                        let sums = &mut self.load_sums.of[load];
+                        for a in 0..D {
+                            sums[a].add(-on_holder[a]);
+                            sums[3].add(-on_holder[a] / dt * way[number][a]);
+                        }
+                    }
+                    Holder::Collider(collider) => {
+                        let position = unknowns.places[number];
+                        let touch = Touch { collider, position, impulse: on_holder };
+                        touch.book(&self.physics.colliders, &self.contacts.states, &mut impulses);
+                    }
+                    Holder::Face(face) => {
+                        if let Some(sums) = self.face_sums.of.get_mut(face) {
+                            sums.iter_mut().zip(on_holder).for_each(|(sum, value)| sum.add(value));
+                        }
+                    }
+                }
+            }
+        }
+        impulses
+    }
+
+    /// Collective over neighbours. Particles take on the displacements of the nodes.
+    fn follow(
+        &mut self,
+        unknowns: &Unknowns<D>,
+        way: &Nodal<D>,
+        rates: &[Rate<D>],
+        impulses: Vec<[ExactSum; SUMS]>,
+        dt: f64,
+    ) -> Result<Moved, StepError> {
+        let to = self.clock.time + dt;
+        let rows = &mut self.grid.fields.rows;
+        for ((&node, &mass), way) in unknowns.nodes.iter().zip(&unknowns.masses).zip(way) {
+            let mut row = [0.0, 0.0, 0.0, mass];
+            (0..D).for_each(|a| row[a] = way[a] / dt);
+            rows[node as usize] = Row(row);
+        }
+        self.prolong();
+        let departed = self.nodes_to_particles(rates, to, dt);
+        self.book_pushes(Lengths { kick: dt, drift: dt });
+        self.chunks.iter_mut().for_each(stop);
+        let moved = self.migrate_particles(departed);
+        self.chunks.iter_mut().for_each(stop);
+        let pushes = vec![Default::default(); rates.len()];
+        self.move_colliders(rates, &pushes, impulses, to, dt);
+        Ok(moved?)
+    }
+}
+
+/// Gives particles their masses back.
+fn restore_masses<const D: usize>(chunks: &mut [Chunk<D>], masses: &[Vec<f64>]) {
+    for (chunk, masses) in chunks.iter_mut().zip(masses) {
+        for (mass, &own) in chunk.column_mut(Layout::<D>::MASS).into_iter().zip(masses) {
+            *mass = own;
+        }
+    }
+}
+
+/// Sets what forces on nodes come from to 0; a step computes it anew from the elastic state.
+fn forget_stress<const D: usize>(chunk: &mut Chunk<D>) {
+    let first = Layout::<D>::AFFINE;
+    (first..first + D * D).for_each(|column| chunk.column_mut(column).fill(0.0));
+    chunk.column_mut(Layout::<D>::STRESS + 2).fill(0.0);
+}

@@ -1,0 +1,284 @@
+//! Unknowns of a load step: displacements of real nodes with material, and what holds them.
+//!
+//! Each rank has all nodes that its particles reach, and computes the same numbers for them as every other
+//! rank; in sums each node counts once, on the rank that owns it. Tied nodes move with the corners of their
+//! ties, `u_j = Σ P_r u_r`, and pass their forces to these with the same weights.
+use partition::MAX_LEVEL;
+use partition::comm::Comm;
+
+use crate::boundary::Contact;
+use crate::boundary::motion::Rate;
+use crate::exact_sum::ExactSum;
+use crate::grid::mask::{bits, block_nodes, node_of_bit};
+use crate::grid::ties::Tied;
+use crate::kernel::BLOCK;
+use crate::load::Kind;
+use crate::quantity::in_job;
+use crate::solver::physics::Physics;
+use crate::solver::state::Solver;
+use crate::solver::state::inside::{Asked, Inside};
+use rayon::prelude::*;
+use rustc_hash::FxHashMap;
+
+/// One vector for each node.
+pub(super) type Nodal<const D: usize> = Vec<[f64; D]>;
+
+/// Mass of a node, over that of the heaviest around, below which it moves with this one.
+const SLIVER: f64 = 1e-4;
+/// No unknown.
+const NONE: u32 = u32::MAX;
+
+/// What prescribes the displacement of a node along an axis.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Holder {
+    /// A load that prescribes velocities, by its number.
+    Grip(usize),
+    /// A collider, by its number.
+    Collider(usize),
+    /// A face of the domain: `2 axis` for the lower, one more for the upper.
+    Face(usize),
+}
+
+/// A prescribed displacement along an axis.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Held {
+    pub(super) by: Holder,
+    /// Displacement in the step, m.
+    pub(super) way: f64,
+}
+
+/// The nodes of a load step.
+pub(super) struct Unknowns<const D: usize> {
+    /// Rows of the nodes.
+    pub(super) nodes: Vec<u32>,
+    /// Whether this rank counts them.
+    pub(super) owned: Vec<bool>,
+    /// Prescribed displacements.
+    pub(super) held: Vec<[Option<Held>; D]>,
+    /// Tied nodes with their corners, by number.
+    ties: Vec<(usize, Vec<(usize, f64)>)>,
+    /// Masses of the nodes, kg.
+    pub(super) masses: Vec<f64>,
+    /// Places of the nodes, m.
+    pub(super) places: Vec<[f64; D]>,
+    /// Edges of the cells at the nodes, m.
+    pub(super) cells: Vec<f64>,
+    /// Places, and edges of the cells, in edges of the finest cells of all.
+    pub(super) lattice: Vec<([i64; D], i64)>,
+}
+
+impl<const D: usize> Unknowns<D> {
+    /// No nodes.
+    pub(super) fn empty() -> Self {
+        Self {
+            nodes: Vec::new(),
+            owned: Vec::new(),
+            held: Vec::new(),
+            ties: Vec::new(),
+            masses: Vec::new(),
+            places: Vec::new(),
+            cells: Vec::new(),
+            lattice: Vec::new(),
+        }
+    }
+
+    /// Ties nodes that hardly any material reaches, and that have no tie so far, to the heaviest node around. Left
+    /// free, they would move without end to relieve the little stress that they bear.
+    fn tie_slivers(&mut self) {
+        let tied = self.tied();
+        let places = self.lattice.iter().zip(0..).map(|(place, number)| (*place, number));
+        let numbers: FxHashMap<([i64; D], i64), usize> = places.collect();
+        let slivers = (0..self.nodes.len()).filter(|&node| !tied[node]).filter_map(|node| {
+            let (place, edge) = self.lattice[node];
+            let around = (0..3_usize.pow(D as u32)).filter_map(|offset| {
+                let along = |a: usize| (offset / 3_usize.pow(a as u32) % 3) as i64 - 1;
+                let beside = std::array::from_fn(|a| place[a] + edge * along(a));
+                numbers.get(&(beside, edge)).copied().filter(|&other| !tied[other])
+            });
+            let heaviest =
+                around.max_by(|&a, &b| self.masses[a].total_cmp(&self.masses[b]).then(b.cmp(&a)))?;
+            (self.masses[node] < SLIVER * self.masses[heaviest]).then_some((node, heaviest))
+        });
+        let slivers: Vec<(usize, usize)> = slivers.collect();
+        let mut leads: Vec<usize> = (0..self.nodes.len()).collect();
+        slivers.iter().for_each(|&(node, heaviest)| leads[node] = heaviest);
+        // Masses grow from lead to lead.
+        self.ties.extend(slivers.iter().map(|&(node, mut lead)| {
+            while leads[lead] != lead {
+                lead = leads[lead];
+            }
+            (node, vec![(lead, 1.0)])
+        }));
+    }
+
+    /// Shares a force on tied nodes out to their corners.
+    pub(super) fn gather_ties(&self, forces: &mut [[f64; D]]) {
+        for (node, corners) in &self.ties {
+            for a in (0..D).filter(|&a| self.held[*node][a].is_none()) {
+                let force = std::mem::replace(&mut forces[*node][a], 0.0);
+                for &(corner, weight) in corners {
+                    forces[corner][a] = weight.mul_add(force, forces[corner][a]);
+                }
+            }
+        }
+    }
+
+    /// Stiffness of tied nodes, N/m, goes to the corners; theirs is not used.
+    pub(super) fn gather_stiffness(&self, stiffness: &mut [f64]) {
+        for (node, corners) in &self.ties {
+            for &(corner, weight) in corners {
+                stiffness[corner] = (weight * weight).mul_add(stiffness[*node], stiffness[corner]);
+            }
+        }
+    }
+
+    /// Gives tied nodes the displacement of their ties.
+    pub(super) fn spread_ties(&self, way: &mut [[f64; D]]) {
+        for (node, corners) in &self.ties {
+            for a in (0..D).filter(|&a| self.held[*node][a].is_none()) {
+                let plane =
+                    corners.iter().fold(0.0, |sum, &(corner, w)| f64::mul_add(w, way[corner][a], sum));
+                way[*node][a] = plane;
+            }
+        }
+    }
+
+    /// Sets to 0 what is held, and tied nodes.
+    pub(super) fn mask(&self, values: &mut [[f64; D]]) {
+        for (value, held) in values.iter_mut().zip(&self.held) {
+            (0..D).filter(|&a| held[a].is_some()).for_each(|a| value[a] = 0.0);
+        }
+        self.ties.iter().for_each(|(node, _)| values[*node] = [0.0; D]);
+    }
+
+    /// Greatest displacement along an axis of any node of this rank, in cells.
+    pub(super) fn greatest_way(&self, way: &[[f64; D]]) -> f64 {
+        let owned = way.iter().zip(&self.cells).zip(&self.owned).filter(|(_, owned)| **owned);
+        let along = owned.flat_map(|((way, cell), _)| way.iter().map(move |way| way.abs() / cell));
+        along.fold(0.0, f64::max)
+    }
+
+    /// Whether each node is tied.
+    pub(super) fn tied(&self) -> Vec<bool> {
+        let mut tied = vec![false; self.nodes.len()];
+        self.ties.iter().for_each(|(node, _)| tied[*node] = true);
+        tied
+    }
+
+    /// Collective. Products of vectors over the nodes of all ranks, exact before they are rounded.
+    pub(super) fn products<const N: usize>(
+        &self,
+        comm: &Comm,
+        pairs: [(&[[f64; D]], &[[f64; D]]); N],
+    ) -> [f64; N] {
+        let mut sums = pairs.map(|(a, b)| {
+            let mut sum = ExactSum::new();
+            for ((a, b), _) in a.iter().zip(b).zip(&self.owned).filter(|(_, owned)| **owned) {
+                a.iter().zip(b).for_each(|(a, b)| sum.add(a * b));
+            }
+            sum
+        });
+        ExactSum::sum_over_ranks(comm, &mut sums);
+        sums.map(|sum| sum.to_f64())
+    }
+}
+
+impl<const D: usize> Solver<D> {
+    /// Collective over neighbours. The unknowns of a step of length `dt` (s): real nodes whose rows have mass.
+    pub(super) fn unknowns(&mut self, rates: &[Rate<D>], dt: f64) -> Unknowns<D> {
+        let mut ties = self.grid.ties.take();
+        if let Some(ties) = &mut ties {
+            self.fill_cells(ties, 0);
+        }
+        let (grid, physics) = (&self.grid, &self.physics);
+        let (plan, rows) = (&grid.plan, &grid.fields.rows);
+        let nodes = block_nodes(D);
+        let mut unknowns = Unknowns::empty();
+        let mut numbers = vec![NONE; rows.len()];
+        let middle = 0.5f64.mul_add(dt, self.clock.time);
+        let colliders = physics.colliders.iter().zip(&self.contacts.states).zip(rates).enumerate();
+        let colliders: Vec<_> =
+            colliders.filter(|(_, ((collider, _), _))| collider.acts_on_nodes()).collect();
+        let active = plan.blocks.iter().enumerate().filter(|(index, _)| grid.fields.active[*index]);
+        for (index, block) in active {
+            let with_mass = |bit: &u32| rows[index * nodes + *bit as usize].0[3] > 0.0;
+            let filled = bits(block.real_nodes()).filter(with_mass).fold(0, |all, bit| all | 1 << bit);
+            let inside: Vec<u64> = colliders
+                .iter()
+                .map(|(_, ((collider, state), _))| {
+                    Inside::find(plan, block, filled, (collider, &state.pose), &[], Asked::NODES).nodes
+                })
+                .collect();
+            for bit in bits(filled) {
+                let node = index * nodes + bit as usize;
+                let x = plan.node_place(block, bit as usize);
+                let mut held = [None; D];
+                physics.grip(&x, [self.clock.time, middle, dt], &mut held);
+                for ((number, ((collider, state), rate)), inside) in colliders.iter().zip(&inside) {
+                    if inside >> bit & 1 == 1 {
+                        let velocity = collider.velocity_at(&x, &state.pose, rate);
+                        let by = Holder::Collider(*number);
+                        held = velocity.map(|v| Some(Held { by, way: dt * v }));
+                    }
+                }
+                physics.hold_at_faces(plan.faces_at(node), &mut held);
+                numbers[node] = unknowns.nodes.len() as u32;
+                unknowns.nodes.push(node as u32);
+                unknowns.owned.push(block.owned >> bit & 1 == 1);
+                unknowns.held.push(held);
+                unknowns.masses.push(rows[node].0[3]);
+                unknowns.places.push(x);
+                unknowns.cells.push(plan.cell(block.level));
+                let edge = 1_i64 << (MAX_LEVEL - block.level);
+                let corner = node_of_bit::<D>(bit);
+                let along = |a: usize| i64::from(block.coord[a]) * BLOCK as i64 + i64::from(corner[a]);
+                unknowns.lattice.push((std::array::from_fn(|a| edge * along(a)), edge));
+            }
+        }
+        if let Some(ties) = &mut ties {
+            let tied: Tied = ties.search(plan, &grid.fields, |_, _| 0);
+            let number = |node: usize| numbers[node] as usize;
+            let all = tied.iter().map(|(node, corners)| {
+                (number(node), corners.iter().map(|c| (number(c.node), c.weight)).collect())
+            });
+            unknowns.ties = all.collect();
+        }
+        unknowns.tie_slivers();
+        self.grid.ties = ties;
+        unknowns
+    }
+}
+
+impl<const D: usize> Physics<D> {
+    /// Displacements that loads prescribe at a place (m) in a step with this start, middle and length, s.
+    fn grip(&self, x: &[f64; D], [start, middle, dt]: [f64; 3], held: &mut [Option<Held>; D]) {
+        for (number, load) in self.loads.iter().enumerate() {
+            let Kind::Velocity(prescribed) = &load.kind else { continue };
+            if !load.is_active(start) || !load.reaches(x) {
+                continue;
+            }
+            for (held, value) in held.iter_mut().zip(prescribed) {
+                if let Some(value) = value {
+                    let velocity = value.at(in_job(&load.origin, x), middle - load.start);
+                    *held = Some(Held { by: Holder::Grip(number), way: dt * velocity });
+                }
+            }
+        }
+    }
+
+    /// Displacements that the faces at a node prescribe, given the bits of the faces.
+    fn hold_at_faces(&self, on: u8, held: &mut [Option<Held>; D]) {
+        for (axis, side) in (0..D).flat_map(|axis| [(axis, 0), (axis, 1)]) {
+            let face = 2 * axis + side;
+            if on >> face & 1 == 0 {
+                continue;
+            }
+            let hold = Some(Held { by: Holder::Face(face), way: 0.0 });
+            match self.faces[axis][side] {
+                Contact::Sticky => *held = [hold; D],
+                Contact::Slip | Contact::Symmetric => held[axis] = hold,
+                Contact::Separating { .. } | Contact::Outflow | Contact::Absorbing => {}
+            }
+        }
+    }
+}
