@@ -118,6 +118,11 @@ fn soil() {
 }
 
 #[test]
+fn safety() {
+    follow("safety");
+}
+
+#[test]
 fn metal() {
     follow("metal");
 }
@@ -143,7 +148,7 @@ fn every_tutorial_is_followed() {
             tutorials += 1;
         }
     }
-    assert!(tutorials >= 4, "{tutorials}");
+    assert!(tutorials >= 5, "{tutorials}");
 }
 
 /// Texts that these tests take for the same, and texts that they do not.
