@@ -6,6 +6,7 @@ use crate::boundary::{Collider, ColliderState};
 use crate::exact_sum::ExactSum;
 use crate::io::log::history::Column;
 use crate::job::Problem;
+use crate::load::Water;
 use crate::material::Failed;
 use crate::probe;
 use crate::setup;
@@ -46,7 +47,8 @@ const COLUMNS: [Column<'static>; 20] = [
 /// Names and units of the columns after the step. Parts of a job add their own in this order: splits and
 /// merges of dynamic refinement; the work of the shift of fluids; work and heat of artificial viscosity; the
 /// progress towards equilibrium; the number of the stage, from 1; sources; failed particles; water in the
-/// pores; loads; contacts between bodies; probes; tracks; fluxes; faces of the domain; colliders.
+/// pores; loads; contacts between bodies; probes; tracks; fluxes; faces of the domain, and the thrust of the
+/// water on them; colliders, each with that on it.
 pub fn columns<const D: usize>(problem: &Problem<D>) -> Vec<(String, &'static str)> {
     let mut columns: Vec<(String, &'static str)> =
         COLUMNS.iter().map(|column| (column.name.to_owned(), column.unit)).collect();
@@ -109,6 +111,11 @@ pub fn columns<const D: usize>(problem: &Problem<D>) -> Vec<(String, &'static st
             }
         }
     }
+    if problem.face_forces && has_thrust(problem) {
+        for axis in &AXES[..D] {
+            columns.extend(["min", "max"].map(|side| (format!("water{axis}_{side}{axis}"), "N")));
+        }
+    }
     for collider in &problem.colliders {
         let mut add = |what: &str, axis: &str, unit| {
             columns.push((format!("{what}_{}{axis}", collider.name), unit));
@@ -129,8 +136,17 @@ pub fn columns<const D: usize>(problem: &Problem<D>) -> Vec<(String, &'static st
                 add("spin", "", "rad/s");
             }
         }
+        if has_thrust(problem) && collider.deforming.is_none() {
+            AXES[..D].iter().for_each(|axis| add("water", axis, "N"));
+        }
     }
     columns
+}
+
+/// Whether the water presses on colliders and faces with a pressure that the job gives.
+pub fn has_thrust<const D: usize>(problem: &Problem<D>) -> bool {
+    let given = |water: &Water| water.quantity().is_some();
+    problem.loads.iter().any(|load| load.water().is_some_and(given))
 }
 
 /// Columns of runs with dynamic refinement: sums since the start.

@@ -15,6 +15,7 @@ use crate::job::Problem;
 use crate::job::problem::Coordinates;
 use crate::probe;
 use crate::probe::line::Sample;
+use crate::solver::diagnostics::thrust::Thrust;
 use crate::solver::diagnostics::totals::{self, GridTotals, ParticleTotals};
 use crate::solver::state::bookings::{FACE_SUMS, FAILED_SUMS, Reaction};
 use crate::solver::state::phases::Phase;
@@ -28,6 +29,8 @@ pub struct Recorder<'a, const D: usize> {
     telemetry: Option<Telemetry>,
     /// The files of lines, on rank 0.
     lines: Vec<History>,
+    /// Surfaces on which the water presses, on rank 0.
+    thrust: Option<Thrust<D>>,
     progress: Progress,
     /// Step of the last row of the history; the same on all ranks.
     last_row: Option<u64>,
@@ -87,6 +90,8 @@ impl<'a, const D: usize> Recorder<'a, D> {
             history,
             telemetry,
             lines,
+            thrust: (comm.rank() == 0 && history::has_thrust(problem))
+                .then(|| Thrust::new(&problem.colliders, problem.size(), problem.root_edge)),
             progress: Progress::new(options.speaks, time, problem.time.end, options.warnings.len()),
             last_row,
             last_values,
@@ -306,10 +311,20 @@ impl<'a, const D: usize> Recorder<'a, D> {
         }
         values.extend(passed);
         faces.iter().for_each(|force| values.extend(&force[..D]));
+        let thrust = self.thrust.as_ref();
+        values.extend(
+            thrust
+                .filter(|_| self.problem.face_forces)
+                .into_iter()
+                .flat_map(|thrust| thrust.on_faces(solver)),
+        );
         let all = solver.physics.colliders.iter().zip(&solver.contacts.states).zip(&reactions);
+        let mut of_water = thrust.map_or_else(Vec::new, |thrust| thrust.on_colliders(solver)).into_iter();
         for ((collider, state), reaction) in all {
             let reaction = if is_ring { &Reaction { torque: [0.0; 3], ..*reaction } } else { reaction };
             values.extend(history::collider_values(collider, state, reaction, &self.problem.origin));
+            let own = of_water.next().filter(|_| collider.deforming.is_none());
+            values.extend(own.into_iter().flatten());
         }
         (values, samples)
     }

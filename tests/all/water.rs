@@ -156,6 +156,37 @@ fn a_block_under_water_is_buoyant() {
     assert!((history.last("work_water") / work - 1.0).abs() < 0.02, "{} J", history.last("work_water"));
 }
 
+/// Water stands 7 m deep on one side of a wall and 2 m on the other: its thrust on the wall is that of two
+/// triangles, on a caisson the weight of the water in its place, and on the faces that of the water beside them.
+#[test]
+fn water_presses_on_walls_and_faces() {
+    let soil = format!("density = 900\nsaturated_density = 1000\n{ELASTIC}");
+    let body = "[bodies.shape]\nkind = 'difference'\nfrom = { kind = 'box', min = [3, -5], max = [5, 0] }\n\
+                remove = [{ kind = 'box', min = [3.75, -6], max = [4.25, 1] }]";
+    let rest = "[[colliders]]\nname = 'wall'\nshape = { kind = 'box', min = [3.9, -6], max = [4.1, 2.5] }\n\
+                contact = { kind = 'slip' }\n\
+                [[colliders]]\nname = 'caisson'\nshape = { kind = 'box', min = [3.2, 0.4], max = [3.5, 1.1] }\n\
+                contact = { kind = 'slip' }\nmotion = { kind = 'steady', velocity = [0, 0.1], angular_velocity = 1 }\n\
+                [time]\nend = 0.01\n[output]\npicture = false\n[history]\nevery_steps = 10\nface_forces = true\n";
+    let history = history_of(&job("level = '2 - 5 * step(x - 4)'", &soil, body, rest));
+    let weight = 9810.0;
+    let expected = [
+        ("water_wall_x", weight * (0.5 * 49.0 - 0.5 * 4.0)),
+        ("water_caisson_x", 0.0),
+        ("water_caisson_y", weight * 0.3 * 0.7),
+        ("water_x_min_x", -weight * 0.5 * 49.0),
+        ("water_x_max_x", weight * 0.5 * 4.0),
+        ("water_y_min_y", -weight * (7.0 + 2.0) * 0.9),
+        ("water_y_max_y", 0.0),
+    ];
+    for (name, expected) in expected {
+        for found in history.column(name) {
+            let scale = if name.contains("caisson") { weight * 0.3 * 0.7 } else { weight * 0.5 * 49.0 };
+            assert!((found - expected).abs() < 5e-3 * scale, "{name}: {found} for {expected}");
+        }
+    }
+}
+
 /// Sand that flies apart under water sinks with the weight of its grains there, whatever the space between them:
 /// buoyancy of that space would throw it out of the water.
 #[test]

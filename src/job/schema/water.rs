@@ -11,7 +11,8 @@ use serde::{Deserialize, Serialize};
 /// its work (J), `work_water`; where densities differ also the mass (kg) of the water that has filled pores since the start, the momentum
 /// (kg m/s) and the kinetic and gravitational energy (J) that it had, `pore_water`, `pore_water_x` and so on, `pore_water_energy`; of
 /// seepage the flow into the ground (m³/s) at each head, `flow_NAME`, and through its surface, `flow_surface`. Forces on colliders and
-/// faces are those of the effective stress, without the pressure of the water on them.
+/// faces are those of the effective stress; the thrust (N) of water with a `level` or a `pressure` stands beside them, at the time of the
+/// row: `water_NAME_x` and so on for a collider that does not deform, and `water_x_min_x` and so on with `history.face_forces`.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Water {

@@ -5,5 +5,6 @@ pub mod maps;
 pub mod pieces;
 mod pores;
 pub mod probes;
+pub mod thrust;
 pub mod totals;
 pub mod tracks;
