@@ -1,10 +1,15 @@
 //! Brittle solid: Hencky elasticity with isotropic damage.
 //!
-//! With the effective Kirchhoff stress `τ̄` of the whole material, the driving strain is `⟨τ̄₁⟩/E` (Rankine)
-//! or `√Σ⟨ε_i⟩²`, κ its greatest value so far, and `τ = (1 - D(κ)) τ̄`; with damage in tension only, D
-//! lowers the principal stresses above zero. Dissipated is the energy that the loss of stiffness sets free, `Y dD`
-//! with `Y = ½ Σ τ̄_i ε_i` over the lowered stresses: exact along proportional paths, which are those
-//! between two states of a step. D is kept, κ follows from it.
+//! With the effective Kirchhoff stress `τ̄` of the whole material, the driving strain is `⟨τ̄₁⟩/E` (Rankine),
+//! `√Σ⟨ε_i⟩²`, or `√(Σ⟨τ̄_i⟩ε_i/E)`, κ its greatest value so far, and `τ = (1 - D(κ)) τ̄`; with damage in
+//! tension only, D lowers the principal stresses above zero. Dissipated is the energy that the loss of stiffness
+//! sets free, `Y dD` with `Y = ½ Σ τ̄_i ε_i` over the lowered stresses: exact along proportional paths, which
+//! are those between two states of a step. D is kept, κ follows from it.
+//!
+//! In a band that opens between solids that stay, the strain along the crack stays too, and
+//! `Y = ½ κ τ̄₁ (1 + ν)(1 - 2ν)/(1 - ν)` with Rankine's κ: the crack takes that share of the energy of
+//! fracture. The third driving strain is that of which `Y = ½ E κ²` in any state of tension, so its cracks take
+//! all of it.
 use super::softening::Curve;
 use super::{Damage, Softening};
 use crate::material::laws::hencky::Hencky;
@@ -25,6 +30,7 @@ const ALIKE: f64 = 0.01;
 enum Drive {
     Rankine,
     Strain,
+    Energy,
 }
 
 /// Brittle solid.
@@ -71,6 +77,9 @@ impl Brittle {
             Damage::Strain { onset, fracture_energy, softening, tension_only } => {
                 (Drive::Strain, onset, fracture_energy, softening, tension_only)
             }
+            Damage::Energy { strength, fracture_energy, softening, tension_only } => {
+                (Drive::Energy, strength / young, fracture_energy, softening, tension_only)
+            }
         };
         Self { solid, drive, curve: Curve::new(softening, onset, energy / young), tension_only, young }
     }
@@ -79,13 +88,19 @@ impl Brittle {
     #[inline(always)]
     fn bound<V: Vector>(&self, strain: &Strain<V>) -> V {
         let (trace, norm) = (strain.trace, strain.norm);
+        let [bulk, twice_mu] = [self.solid.bulk_modulus(), 2.0 * self.solid.shear_modulus()];
         match self.drive {
             Drive::Rankine => {
-                let deviator =
-                    norm * (2.0 * (2.0_f64 / 3.0).sqrt() * self.solid.shear_modulus() / self.young);
-                trace.mul_add(V::splat(self.solid.bulk_modulus() / self.young), deviator)
+                let deviator = norm * ((2.0_f64 / 3.0).sqrt() * twice_mu / self.young);
+                trace.mul_add(V::splat(bulk / self.young), deviator)
             }
             Drive::Strain => norm.mul_add(norm, trace * trace * (1.0 / 3.0)).sqrt(),
+            // The greater of twice the shear modulus and three times the bulk modulus times the square of the
+            // strain: the product of the lengths of stress and strain is no greater.
+            Drive::Energy => {
+                let square = norm.mul_add(norm, trace * trace * (1.0 / 3.0));
+                (square * (twice_mu.max(3.0 * bulk) / self.young)).sqrt()
+            }
         }
     }
 
@@ -98,6 +113,12 @@ impl Brittle {
             Drive::Strain => {
                 let [a, b, c] = each(parts.strain, |e| e.max(zero));
                 a.mul_add(a, b.mul_add(b, c * c)).sqrt()
+            }
+            Drive::Energy => {
+                let [a, b, c] = each(parts.stress, |s| s.max(zero));
+                let [x, y, z] = parts.strain;
+                let twice = a.mul_add(x, b.mul_add(y, c * z)).max(zero);
+                (twice * (1.0 / self.young)).sqrt()
             }
         }
     }

@@ -166,10 +166,49 @@ fn unlike_damage_does_not_merge() {
     assert!(!metal.alike(&[0.5, 0.0, 1.0], &[0.5, 0.0, 1.008]), "strength differs by 8 %");
 }
 
+/// A crack that opens between solids that stay takes the energy of fracture with `energy`, and the share of it
+/// that follows from Poisson's ratio with the others; under uniaxial stress all take it.
+#[test]
+fn cracks_between_solids_take_their_energy_of_fracture() {
+    for poisson in [0.0, 0.2, 0.4] {
+        let share = (1.0 + poisson) * (1.0 - 2.0 * poisson) / (1.0 - poisson);
+        let kinds = [
+            ("kind = 'energy', strength = 3e6", 1.0),
+            ("kind = 'rankine', strength = 3e6", share),
+            ("kind = 'strain', onset = 1e-4", 1.0 / share),
+        ];
+        for (kind, share) in kinds {
+            for law in ["linear", "exponential_total_strain", "exponential_crack_opening"] {
+                for (lateral, expected) in [(0.0, 100.0 * share), (-poisson, 100.0)] {
+                    let text = format!(
+                        "model = 'hencky', young = {YOUNG}, poisson = {poisson}, damage = {{{kind}, \
+                         fracture_energy = 100.0, softening = '{law}'}}"
+                    );
+                    let material = text.parse::<Parameters>().unwrap().build(2400.0);
+                    let mut point = Point::new(material.as_ref());
+                    point.size = 0.05;
+                    // To 600 times the strain of the onset: next to nothing is left of the exponential laws.
+                    for _ in 0..200 {
+                        point.stretch([3e-4, lateral * 3e-4, lateral * 3e-4]);
+                    }
+                    let taken = point.work * point.size;
+                    let place = format!("{kind} {law} {poisson} {lateral}");
+                    assert!((taken / expected - 1.0).abs() < 1e-6, "{place}: {taken} for {expected}");
+                }
+            }
+        }
+    }
+}
+
 /// In multiaxial strain with damage of all stress, the work of the stress is what is stored and what is taken.
 #[test]
 fn work_is_stored_or_taken() {
-    for kind in ["kind = 'rankine', strength = 3e6", "kind = 'strain', onset = 1e-4"] {
+    let kinds = [
+        "kind = 'rankine', strength = 3e6",
+        "kind = 'strain', onset = 1e-4",
+        "kind = 'energy', strength = 3e6",
+    ];
+    for kind in kinds {
         for law in ["linear", "exponential_total_strain", "exponential_crack_opening"] {
             let text = format!(
                 "model = 'hencky', young = {YOUNG}, poisson = 0.2, damage = {{{kind}, \
