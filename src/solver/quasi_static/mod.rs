@@ -41,6 +41,9 @@ const NEARLY: f64 = 0.9;
 /// Newton iterations up to which convergence is fast.
 const FAST: u32 = 6;
 
+/// Force of a load at a node: numbers of both, and the force, N.
+type Pull<const D: usize> = (usize, usize, [f64; D]);
+
 impl<const D: usize> Solver<D> {
     /// Collective. A load step from the present time of at most `dt`, s. Returns its length, and what has moved
     /// or why the step failed.
@@ -97,11 +100,7 @@ impl<const D: usize> Solver<D> {
 
     /// Collective over neighbours. Unknowns of a step, and the forces of loads and gravity at its end; also
     /// accelerations by loads at nodes, for their sums: load, node and force.
-    fn outer_forces(
-        &mut self,
-        rates: &[Rate<D>],
-        dt: f64,
-    ) -> (Unknowns<D>, Nodal<D>, Vec<(usize, usize, [f64; D])>) {
+    fn outer_forces(&mut self, rates: &[Rate<D>], dt: f64) -> (Unknowns<D>, Nodal<D>, Vec<Pull<D>>) {
         // The force over 1 s at the end of the step is an impulse.
         let at_end = Lengths { kick: 1.0, drift: 2.0f64.mul_add(dt, 1.0) };
         self.chunks.iter_mut().for_each(forget_stress);
@@ -158,7 +157,7 @@ impl<const D: usize> Solver<D> {
         unknowns: &Unknowns<D>,
         rest: &Nodal<D>,
         way: &Nodal<D>,
-        pulls: &[(usize, usize, [f64; D])],
+        pulls: &[Pull<D>],
         dt: f64,
     ) -> Vec<[ExactSum; SUMS]> {
         let mut impulses = self.no_impulses();

@@ -130,10 +130,10 @@ impl<const D: usize> Solver<D> {
     ) -> Option<Iterate<D>> {
         unknowns.spread_ties(&mut way);
         let mut moves = way.iter().zip(&unknowns.cells);
-        let is_far = moves.any(|(way, cell)| way.iter().any(|way| !(way.abs() <= MOST_WAY * cell)));
+        let is_near = moves.all(|(way, cell)| way.iter().all(|way| way.abs() <= MOST_WAY * cell));
         self.show(unknowns, &way);
         let is_sound = self.stress_of_displacements(points, Sweep::Deform { dt });
-        if self.comm.any(is_far || !is_sound) {
+        if self.comm.any(!is_near || !is_sound) {
             return None;
         }
         let mut stiffness: Vec<f64> = Vec::with_capacity(way.len());
@@ -230,7 +230,8 @@ impl<const D: usize> Solver<D> {
         for _ in 0..LINEAR {
             let taken = self.resistance(unknowns, points, &way);
             let curvature = unknowns.products(&self.comm, [(&way, &taken)])[0];
-            if !(curvature > 0.0) || !(towards.product > 0.0) {
+            let is_convex = curvature > 0.0 && towards.product > 0.0;
+            if !is_convex {
                 break;
             }
             effort.linear += 1;
@@ -239,7 +240,8 @@ impl<const D: usize> Solver<D> {
             subtract(&mut rest, &taken, length);
             let scale = towards.square.sqrt();
             let next = coarse.towards(&self.comm, unknowns, &now.stiffness, &rest, scale);
-            if !(next.square.sqrt() > target * norm) {
+            let is_left = next.square.sqrt() > target * norm;
+            if !is_left {
                 break;
             }
             let share = next.product / towards.product;

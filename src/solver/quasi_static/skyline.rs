@@ -66,7 +66,8 @@ impl Skyline {
                 pivot = (-scaled).mul_add(own[column - first], pivot);
                 own[column - first] = scaled;
             }
-            if !(pivot > LEAST * whole) {
+            let is_pivot = pivot > LEAST * whole;
+            if !is_pivot {
                 pivot = if whole > 0.0 { whole } else { 1.0 };
                 own[..row - first].fill(0.0);
             }

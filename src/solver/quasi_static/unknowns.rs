@@ -23,6 +23,9 @@ use rustc_hash::FxHashMap;
 /// One vector for each node.
 pub(super) type Nodal<const D: usize> = Vec<[f64; D]>;
 
+/// Two such vectors.
+type Pair<'a, const D: usize> = (&'a [[f64; D]], &'a [[f64; D]]);
+
 /// Mass of a node, over that of the heaviest around, below which it moves with this one.
 const SLIVER: f64 = 1e-4;
 /// No unknown.
@@ -166,11 +169,7 @@ impl<const D: usize> Unknowns<D> {
     }
 
     /// Collective. Products of vectors over the nodes of all ranks, exact before they are rounded.
-    pub(super) fn products<const N: usize>(
-        &self,
-        comm: &Comm,
-        pairs: [(&[[f64; D]], &[[f64; D]]); N],
-    ) -> [f64; N] {
+    pub(super) fn products<const N: usize>(&self, comm: &Comm, pairs: [Pair<'_, D>; N]) -> [f64; N] {
         let mut sums = pairs.map(|(a, b)| {
             let mut sum = ExactSum::new();
             for ((a, b), _) in a.iter().zip(b).zip(&self.owned).filter(|(_, owned)| **owned) {
