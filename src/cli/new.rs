@@ -62,7 +62,6 @@ const TEMPLATES: &[Template] = templates![
     "elastic_cubes";
     "perforated_plate";
     "block_on_edge";
-    "snow_slab";
     "charge_in_sand";
     "taylor_bar" quick "tree.base_level=1", "adaptivity.criteria.0.level=3", "adaptivity.criteria.1.level=2";
     "taylor_bar_johnson_cook" quick "tree.base_level=1", "adaptivity.criteria.0.level=2", "adaptivity.criteria.1.level=2";
