@@ -90,7 +90,7 @@ impl Copy {
     }
 }
 
-/// A job with one particle per cell that ends after a hundredth of its time. Forces at points need the
+/// A job with one particle per cell whose stages and end come after a hundredth of their times. Forces at points need the
 /// particles that they are for.
 fn shortened(job: &str) -> String {
     let mut short = String::new();
@@ -105,7 +105,9 @@ fn shortened(job: &str) -> String {
         let (key, value) = line.split_once('=').unwrap_or((line, ""));
         let number = value.split('#').next().and_then(|value| value.trim().parse::<f64>().ok());
         match (table, key.trim(), number) {
-            ("time", "end", Some(end)) => writeln!(short, "end = {:e}", end / 100.0),
+            ("time", "end", Some(time)) | ("stages", "duration", Some(time)) => {
+                writeln!(short, "{} = {:e}", key.trim(), time / 100.0)
+            }
             (_, "particles_per_cell", _) if !has_points => Ok(()),
             _ => writeln!(short, "{line}"),
         }
