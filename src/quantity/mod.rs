@@ -22,6 +22,8 @@ use std::sync::Arc;
 
 /// Names of the coordinates.
 pub const AXES: [&str; 3] = ["x", "y", "z"];
+/// Names of the faces of the domain, by axis and side.
+pub const FACES: [[&str; 2]; 3] = [["x_min", "x_max"], ["y_min", "y_max"], ["z_min", "z_max"]];
 
 /// From 0 at 0 to 1 at 1 on half a period of a cosine, `(1 - cos(π s)) / 2`; constant outside.
 pub fn smooth_step(s: f64) -> f64 {

@@ -8,7 +8,7 @@ use crate::grid::mask::{bits, block_nodes, node_of_bit};
 use crate::grid::plan::GridPlan;
 use crate::grid::sums::node_fields::NodeFields;
 
-/// What the search needs of a plan.
+/// Neighbourhoods of the blocks of a plan, and memory of the search.
 pub(super) struct Finder<const D: usize> {
     rings: Vec<Vec<[i32; D]>>,
     /// Neighbourhood of each block, found on demand.

@@ -9,14 +9,12 @@ use crate::job::problem::Problem;
 use crate::job::schema::job_file::JobFile;
 use crate::kernel::Transfer;
 use crate::load::Kind;
+use crate::quantity::FACES;
 use crate::solver::QuasiStatic;
 use crate::text::written;
 
 /// Load steps without a `min_step` become that much shorter at most.
 const SHORTENING: f64 = 1024.0;
-
-/// Keys of the faces.
-const FACES: [[&str; 2]; 3] = [["x_min", "x_max"], ["y_min", "y_max"], ["z_min", "z_max"]];
 
 /// Settings of the load steps of a job, if it has them.
 pub(super) fn settings(checks: &mut Checks, file: &JobFile, root: &Path) -> Option<QuasiStatic> {
@@ -57,7 +55,7 @@ pub(super) fn check<const D: usize>(checks: &mut Checks, file: &JobFile, problem
     let numerics = root.key("numerics");
     let is_affine = matches!(problem.transfer, Transfer::Apic | Transfer::Tpic);
     refuse(!is_affine, numerics.key("transfer"), "a transfer by increments", "\"apic\" or \"tpic\"");
-    refuse(problem.viscosity.is_some(), numerics.key("viscosity"), "artificial viscosity", none);
+    refuse(problem.viscosity.is_some(), numerics.key("artificial_viscosity"), "artificial viscosity", none);
     for (i, material) in problem.materials.iter().enumerate() {
         let here = root.key("materials").index(i).key("model");
         refuse(material.build().is_fluid(), here, "a fluid", "a solid or granular material");

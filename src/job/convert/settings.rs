@@ -10,6 +10,7 @@ use crate::job::schema::job_file::{self as file, JobFile};
 use crate::job::schema::output::Output;
 use crate::material::Viscosity;
 use crate::particle::followed::{Followed, Motion};
+use crate::quantity::FACES;
 use crate::text::{number, written};
 
 /// Most output files of one run.
@@ -58,7 +59,7 @@ pub(in crate::job) fn absorbing<const D: usize>(
     let mut sides: AbsorbingFaces<D> = std::array::from_fn(|_| [None, None]);
     for (axis, side) in (0..D).flat_map(|axis| [(axis, 0), (axis, 1)]) {
         if let Some(file::Face::Absorbing { p_speed, s_speed, density, pressure }) = all[axis][side] {
-            let key = [["x_min", "x_max"], ["y_min", "y_max"], ["z_min", "z_max"]][axis][side];
+            let key = FACES[axis][side];
             let pressure = at_nodes::<D>(checks, pressure, &path.key(key).key("pressure"))?;
             let face = Absorbing { p_speed: *p_speed, s_speed: *s_speed, density: *density, pressure };
             sides[axis][side] = Some(Box::new(face));

@@ -7,7 +7,7 @@ use crate::job::problem::{Body, CELLS_PER_LEAF, TreeSetup};
 use crate::job::schema::common::FASTEST;
 use crate::job::schema::job_file::{self as file, JobFile, Source as WrittenSource};
 use crate::material::parameters::Parameters;
-use crate::quantity::Quantity;
+use crate::quantity::{FACES, Quantity};
 use crate::source::{Source, particles_in};
 use crate::text::{number as rounded, quantity, written as number};
 use rustc_hash::FxHashMap;
@@ -122,7 +122,7 @@ fn source<const D: usize>(
     let side = usize::from(velocity[axis] > 0.0);
     let way = [bounds.lower[axis], space.size[axis] - bounds.upper[axis]][side];
     if way < 0.5 * spacing && !super::is_outflow(&file.boundaries, axis, side) {
-        let face = [["x_min", "x_max"], ["y_min", "y_max"], ["z_min", "z_max"]][axis][side];
+        let face = FACES[axis][side];
         let message = format!(
             "found a velocity that leads into the face {face}, where the shape ends; expected one that leads into the domain, or a face of kind `outflow`"
         );

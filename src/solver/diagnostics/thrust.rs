@@ -8,6 +8,7 @@ use crate::boundary::Collider;
 use crate::geometry::Aabb;
 use crate::geometry::surface::{Patch, Region, patches};
 use crate::load::{Load, Water};
+use crate::quantity::in_job;
 use crate::solver::state::Solver;
 
 /// Least number of cells of the lattice along the longest edge of a collider, and of points along an edge of a
@@ -35,9 +36,7 @@ struct Acting<'a, const D: usize> {
 impl<const D: usize> Acting<'_, D> {
     /// Pressure at a place in the domain, Pa.
     fn pressure(&self, x: &[f64; D]) -> f64 {
-        let mut place = [0.0; 3];
-        (0..D).for_each(|a| place[a] = self.origin[a] + x[a]);
-        self.water.pressure(place, self.time - self.load.start, &self.gravity)
+        self.water.pressure(in_job(&self.origin, x), self.time - self.load.start, &self.gravity)
     }
 }
 

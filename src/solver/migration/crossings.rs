@@ -4,6 +4,7 @@ use partition::comm::Comm;
 use super::fluxes::Fluxes;
 use crate::boundary::{Contact, Leaving};
 use crate::exact_sum::ExactSum;
+use crate::quantity::FACES;
 use crate::solver::physics::Physics;
 use crate::text::{count, quantity};
 
@@ -80,7 +81,7 @@ pub(super) fn farthest_beyond<const D: usize>(
 
 /// Name of a face of the domain in the job.
 pub(super) fn face_name((axis, side): (usize, usize)) -> &'static str {
-    [["x_min", "x_max"], ["y_min", "y_max"], ["z_min", "z_max"]][axis][side]
+    FACES[axis][side]
 }
 
 /// A particle that is no longer in the domain.

@@ -24,7 +24,7 @@ use crate::exact_sum::ExactSum;
 use crate::material::SHOCK_SUMS;
 use crate::particle::Chunk;
 use crate::probe::{Maxima, Tracked};
-use crate::quantity::NotFinite;
+use crate::quantity::{FACES, NotFinite};
 use crate::solver::physics::Physics;
 use crate::solver::state::bookings::{
     Contacts, ExactSums, FACE_SUMS, FAILED_SUMS, LOAD_SUMS, Near, ParticlePush, SOURCE_SUMS, SourcePush,
@@ -86,7 +86,7 @@ pub enum StepError {
     },
     /// Material of a quasi-static job has come to a face that only bears pressure.
     #[error(
-        "material has reached the face boundaries.{}_{}, which is separating; expected sticky, slip or symmetric faces where material rests in a quasi-static job", ["x", "y", "z"][face / 2], ["min", "max"][face % 2]
+        "material has reached the face boundaries.{}, which is separating; expected sticky, slip or symmetric faces where material rests in a quasi-static job", FACES[face / 2][face % 2]
     )]
     Face {
         /// The face: `2 axis`, one more for the upper.
