@@ -20,7 +20,7 @@ use crate::particle::followed::Followed;
 use crate::particle::given::Given;
 use crate::probe::{Flux, Line, Map, Probe, Track};
 use crate::quantity::{Quantity, in_job};
-use crate::solver::{Equilibrium, QuasiStatic};
+use crate::solver::{Equilibrium, QuasiStatic, Ties};
 use crate::source::Source;
 use partition::{Brick, Octant};
 use std::path::PathBuf;
@@ -169,8 +169,8 @@ pub struct Problem<const D: usize> {
     pub viscosity: Option<Viscosity>,
     /// Load steps in place of time steps; `None`: none.
     pub quasi_static: Option<QuasiStatic>,
-    /// Whether surface nodes are tied.
-    pub tied_surfaces: bool,
+    /// Velocity fields whose surface nodes are tied.
+    pub ties: Ties,
     /// Output files.
     pub output: OutputSetup,
     /// Checkpoints.

@@ -11,7 +11,7 @@ use crate::job::Problem;
 use crate::particle::chunk::{Chunk, Tag};
 use crate::solver::balance::rebalance::cut_at;
 use crate::solver::state::cost::leaf_cost;
-use crate::solver::{Clock, Physics, Solver, StepControl};
+use crate::solver::{Clock, Physics, Solver, StepControl, Ties};
 
 mod carried;
 pub mod estimate;
@@ -61,7 +61,7 @@ fn constant_physics<const D: usize>(problem: &Problem<D>) -> Physics<D> {
         has_halves: false,
         f_bar: problem.f_bar,
         viscosity: problem.viscosity,
-        ties: problem.tied_surfaces || problem.quasi_static.is_some(),
+        ties: if problem.quasi_static.is_some() { Ties::All } else { problem.ties },
         followed: problem.output.followed,
         control: StepControl {
             cfl: problem.time.cfl,

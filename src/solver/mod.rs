@@ -28,7 +28,7 @@ pub mod stage;
 pub mod state;
 pub mod step;
 
-pub use physics::{Equilibrium, Physics, QuasiStatic, StepControl};
+pub use physics::{Equilibrium, Physics, QuasiStatic, StepControl, Ties};
 pub use state::{Clock, Effort, Requests, Solver, StepError, StepReport};
 
 use partition::Forest;

@@ -77,12 +77,23 @@ pub struct Physics<const D: usize> {
     pub f_bar: bool,
     /// Artificial viscosity, if there is any.
     pub viscosity: Option<Viscosity>,
-    /// Whether surface nodes are tied.
-    pub ties: bool,
+    /// Velocity fields whose surface nodes are tied.
+    pub ties: Ties,
     /// Quantities that particles carry of their past.
     pub followed: Followed,
     /// Choice of the time step.
     pub control: StepControl,
+}
+
+/// Velocity fields whose surface nodes move with the material beside them.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Ties {
+    /// None.
+    None,
+    /// Those whose material is elastic.
+    Elastic,
+    /// All.
+    All,
 }
 
 /// Criteria of equilibrium, and the mass scaling on the way to it.
@@ -195,6 +206,20 @@ impl<const D: usize> Physics<D> {
     /// Where the material of a velocity field meets surfaces.
     fn meets(&self, field: usize) -> Meets {
         self.meets.get(field).copied().unwrap_or_default()
+    }
+
+    /// Whether the surface nodes of a velocity field are tied.
+    pub(in crate::solver) fn has_ties(&self, field: usize) -> bool {
+        match self.ties {
+            Ties::None => false,
+            Ties::Elastic => self.meets(field) == Meets::Surface,
+            Ties::All => true,
+        }
+    }
+
+    /// Whether those of any velocity field are.
+    pub(in crate::solver) fn has_any_ties(&self) -> bool {
+        (0..self.body_contacts.fields()).any(|field| self.has_ties(field))
     }
 
     /// Whether the material of a velocity field moves freely over the gap between it and a surface.

@@ -29,6 +29,7 @@ mod neighbourhood;
 mod plane;
 
 use partition::comm::{Comm, Traffic};
+use rayon::prelude::*;
 
 use self::finder::{Finder, Memory};
 pub use self::impulses::Tied;
@@ -50,6 +51,8 @@ pub struct Ties<const D: usize> {
     finder: Finder<D>,
     /// Nodes of each block on faces of the domain.
     on_faces: Vec<u64>,
+    /// Nodes of each block near what never moves, once they are known.
+    near_still: Vec<Option<u64>>,
     /// By velocity field.
     memories: Vec<Memory>,
 }
@@ -63,7 +66,8 @@ impl<const D: usize> Ties<D> {
             .iter()
             .for_each(|&(node, _)| on_faces[node as usize / nodes] |= 1 << (node as usize % nodes));
         let (words, finder) = (LeafWords::new(comm, &plan.tree), Finder::new());
-        Self { words, filled: Vec::new(), finder, on_faces, memories: Vec::new() }
+        let near_still = vec![None; plan.blocks.len()];
+        Self { words, filled: Vec::new(), finder, on_faces, near_still, memories: Vec::new() }
     }
 
     /// Messages and bytes so far.
@@ -74,12 +78,21 @@ impl<const D: usize> Ties<D> {
     /// Heap bytes held.
     pub fn heap_bytes(&self) -> usize {
         let memories = self.memories.iter().map(Memory::heap_bytes).sum::<usize>();
-        size_of_val(&self.filled[..]) + size_of_val(&self.on_faces[..]) + self.finder.heap_bytes() + memories
+        let words = self.filled.len() + self.on_faces.len() + 2 * self.near_still.len();
+        size_of::<u64>() * words + self.finder.heap_bytes() + memories
     }
 
     /// Collective over neighbours. Takes the well filled cells of each own leaf, a bit each.
     pub fn fill(&mut self, plan: &GridPlan<D>, own: &[u64]) {
         self.words.share(&plan.tree, own, &mut self.filled);
+    }
+
+    /// Not collective. Tells the ties which nodes of blocks with mass are near what never moves; `find` is asked
+    /// once for each block.
+    pub fn note_still(&mut self, fields: &NodeFields<D>, find: impl Fn(usize) -> u64 + Sync) {
+        let blocks = self.near_still.par_iter_mut().zip(&fields.active).enumerate().with_min_len(16);
+        let new = blocks.filter(|(_, (known, active))| **active && known.is_none());
+        new.for_each(|(block, (known, _))| *known = Some(find(block)));
     }
 
     /// Not collective. Ties the nodes of the velocity field of this number, whose rows hold velocities and
@@ -96,9 +109,8 @@ impl<const D: usize> Ties<D> {
             self.memories.resize_with(field + 1, Memory::default);
         }
         let memory = &mut self.memories[field];
-        let on_faces = &self.on_faces;
-        self.finder
-            .find(plan, fields, &self.filled, memory, |block, nodes| on_faces[block] | held(block, nodes));
+        let known = |block: usize| self.on_faces[block] | self.near_still[block].unwrap_or(0);
+        self.finder.find(plan, fields, &self.filled, memory, |block, nodes| known(block) | held(block, nodes));
         memory.tied.pull(fields);
     }
 

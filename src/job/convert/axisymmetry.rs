@@ -120,7 +120,7 @@ pub(super) fn check<const D: usize>(
         "\"fixed\"",
         "\"volume\" or \"cell\"",
     );
-    refuse(file.numerics.tied_surfaces, numerics.key("tied_surfaces"), "tied surfaces", "none");
+    refuse(file.numerics.tied_surfaces == Some(true), numerics.key("tied_surfaces"), "tied surfaces", "none");
     refuse(file.water.is_some(), root.key("water"), "water in the pores", "none");
     refuse(!file.sources.is_empty(), root.key("sources"), "sources", "bodies");
     for (i, field) in file.output.chosen().iter().enumerate() {

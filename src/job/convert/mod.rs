@@ -40,6 +40,7 @@ use crate::material::parameters::{OutOfRange, Parameters};
 use crate::material::undrained::Undrained;
 use crate::particle::followed::Motion;
 use crate::quantity::{AXES, Quantity};
+use crate::solver::Ties;
 use crate::text::{excerpt, number, written};
 use partition::{Brick, key::MAX_ROOTS};
 use rustc_hash::FxHashMap;
@@ -230,7 +231,11 @@ fn problem<const D: usize>(
         f_bar: file.numerics.f_bar,
         viscosity: settings::viscosity(&file.numerics),
         quasi_static: quasi_static::settings(checks, file, &root),
-        tied_surfaces: file.numerics.tied_surfaces,
+        ties: match (file.numerics.tied_surfaces, coordinates) {
+            (Some(true), _) => Ties::All,
+            (None, Coordinates::Cartesian) => Ties::Elastic,
+            _ => Ties::None,
+        },
         output,
         checkpoint: CheckpointSetup {
             every_steps: file.checkpoint.every_steps,

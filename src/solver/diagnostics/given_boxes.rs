@@ -16,7 +16,7 @@ use crate::particle::chunk::{Chunk, Layout, Tag};
 use crate::particle::followed::Followed;
 use crate::particle::lanes::values;
 use crate::simd::{Lanes, Vector};
-use crate::solver::physics::{Physics, StepControl};
+use crate::solver::physics::{Physics, StepControl, Ties};
 use crate::solver::sorting::bins::{BinMissing, BoxWidths};
 use crate::solver::state::{Clock, Solver};
 use crate::solver::step::node_update::update_velocity;
@@ -119,7 +119,7 @@ impl<const D: usize> GivenBoxes<D> {
             has_halves: false,
             f_bar: false,
             viscosity: None,
-            ties: false,
+            ties: Ties::None,
             followed: Followed::default(),
             control: StepControl { cfl: 1.0, dt_max: None, growth: 1.0 },
         };

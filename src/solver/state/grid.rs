@@ -68,11 +68,11 @@ impl<const D: usize> Grid<D> {
         physics: &Physics<D>,
         reach: u32,
     ) -> Self {
-        let allowance =
-            Allowance { reach, graded: physics.graded, halo: if physics.ties { HALO } else { 0 } };
+        let has_ties = physics.has_any_ties();
+        let allowance = Allowance { reach, graded: physics.graded, halo: if has_ties { HALO } else { 0 } };
         let plan = GridPlan::build(comm, forest, physics.root_edge, allowance);
         let (exchange, received) = ArenaExchange::new(comm, &plan);
-        let ties = physics.ties.then(|| Box::new(Ties::new(comm, &plan)));
+        let ties = has_ties.then(|| Box::new(Ties::new(comm, &plan)));
         let neighbours = exchange.neighbours().to_vec();
         let others = 1..physics.body_contacts.fields();
         Self {

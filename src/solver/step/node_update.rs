@@ -36,6 +36,7 @@ impl<const D: usize> Solver<D> {
             true => [0.0; D],
         };
         let is_step = lengths.drift > 0.0;
+        let occupied = self.occupied();
         let mut pushes = Vec::new();
         self.for_each_field(|solver, field| {
             let grid = &mut solver.grid;
@@ -43,7 +44,7 @@ impl<const D: usize> Solver<D> {
                 .phases
                 .time(Phase::Nodes, || update_velocity(&mut grid.fields, &grid.plan, gravity, lengths.kick));
             pushes.push(solver.apply_loads(lengths));
-            solver.tie_surface(field);
+            solver.tie_surface(field, &occupied);
         });
         let meets = self.meeting_nodes(is_step);
         let mut held = self.find_surfaces(&meets, lengths);

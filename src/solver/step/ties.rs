@@ -2,17 +2,21 @@
 //! fixed by other conditions.
 use rayon::prelude::*;
 
-use crate::boundary::Collider;
+use crate::boundary::{Collider, ColliderState};
 use crate::grid::leaf_geometry::{LeafCells, leaf_box};
+use crate::grid::mask::{bits, block_nodes};
+use crate::grid::plan::Block;
 use crate::grid::ties::Ties;
+use crate::grid::{GridPlan, NodeFields};
 use crate::kernel::BLOCK;
+use crate::load::{Kind, Load};
 use crate::particle::Chunk;
 use crate::particle::chunk::{Layout, TILE};
 use crate::particle::group::{Group, Share};
 use crate::particle::volume::{box_volume, volume_ratios};
 use crate::solver::state::Solver;
 use crate::solver::state::grid::Grid;
-use crate::solver::state::inside::{Asked, Inside, is_still};
+use crate::solver::state::inside::{SAME, is_still};
 use crate::solver::state::phases::Phase;
 
 /// Share of its volume from which a cell is well filled. A little less than one half, so that cells that are
@@ -48,37 +52,90 @@ fn well_filled<const D: usize>(
     well.fold(0, |cells, (cell, _)| cells | 1 << cell)
 }
 
+/// Distance from a collider, in cells, below which nodes have no ties.
+const NEAR: f64 = 1.0;
+
+/// Those of some nodes of a block that lie in colliders or near one.
+fn near_colliders<const D: usize>(
+    plan: &GridPlan<D>,
+    block: &Block<D>,
+    nodes: u64,
+    colliders: &[(&Collider<D>, &ColliderState<D>)],
+) -> u64 {
+    let reach = NEAR * plan.cell(block.level) * (1.0 + SAME);
+    let nodes_box = plan.nodes_box(block);
+    let mut near = 0;
+    for (collider, ColliderState { pose, .. }) in colliders {
+        if nodes != near && collider.distance_to_box(&nodes_box, pose) <= reach {
+            let found = bits(nodes & !near)
+                .filter(|bit| collider.distance(&plan.node_place(block, *bit as usize), pose) <= reach);
+            near |= found.fold(0, |all, bit| all | 1 << bit);
+        }
+    }
+    near
+}
+
+/// Real nodes with mass, a word for each block.
+fn with_mass<const D: usize>(plan: &GridPlan<D>, fields: &NodeFields<D>) -> Vec<u64> {
+    let nodes = block_nodes(D);
+    let all = plan.blocks.par_iter().zip(&fields.active).enumerate().with_min_len(64);
+    let words = all.map(|(index, (block, active))| match active {
+        true => {
+            let has_mass = |bit: &u32| fields.rows[index * nodes + *bit as usize].0[3] > 0.0;
+            bits(block.real_nodes()).filter(has_mass).fold(0, |all, bit| all | 1 << bit)
+        }
+        false => 0,
+    });
+    words.collect()
+}
+
 impl<const D: usize> Solver<D> {
+    /// Nodes with mass of each velocity field, a word for each block, where fields with ties meet others. To be
+    /// called before velocities of nodes change.
+    pub(super) fn occupied(&mut self) -> Vec<Vec<u64>> {
+        let mut occupied = Vec::new();
+        if self.grid.ties.is_some() && self.physics.body_contacts.fields() > 1 {
+            self.for_each_field(|solver, _| occupied.push(with_mass(&solver.grid.plan, &solver.grid.fields)));
+        }
+        occupied
+    }
+
     /// Collective over neighbours. Ties the surface nodes of the velocity field numbered `field`, which is in
-    /// the place of the first and whose rows hold velocities, in jobs with ties. Nodes on faces of the domain
-    /// and inside colliders follow these.
-    pub(super) fn tie_surface(&mut self, field: usize) {
+    /// the place of the first and whose rows hold velocities, if it has ties. Free of ties stay nodes that
+    /// other conditions move and nodes beside what the material may touch, where ties would keep it from
+    /// giving way: nodes on faces of the domain, in grips, within a cell of colliders, and those of other
+    /// fields, whose nodes with mass are `occupied`.
+    pub(super) fn tie_surface(&mut self, field: usize, occupied: &[Vec<u64>]) {
+        if !self.physics.has_ties(field) {
+            return;
+        }
         let Some(mut ties) = self.grid.ties.take() else { return };
         self.fill_cells(&mut ties, field);
-        let colliders: Vec<(usize, &Collider<D>)> = self
+        let all = self.physics.colliders.iter().zip(&self.contacts.states);
+        let (still, moving): (Vec<_>, Vec<_>) =
+            all.filter(|(collider, _)| collider.is_present()).partition(|(collider, _)| is_still(collider));
+        let grips: Vec<&Load<D>> = self
             .physics
-            .colliders
+            .loads
             .iter()
-            .enumerate()
-            .filter(|(_, collider)| collider.acts_on_nodes())
+            .filter(|load| matches!(load.kind, Kind::Velocity(_)) && load.is_active(self.clock.time))
             .collect();
-        let states = &self.contacts.states;
-        let Grid { fields, plan, inside_still, .. } = &mut self.grid;
-        let still = &*inside_still;
+        let Grid { fields, plan, .. } = &mut self.grid;
+        let plan = &*plan;
         self.phases.time(Phase::Nodes, || {
-            ties.tie(plan, field, fields, |block, nodes| {
-                let all = colliders.iter().map(|&(index, collider)| {
-                    // The known nodes inside colliders that never move cover all real nodes.
-                    let known = still.get(block).and_then(|of_block| of_block.get(index)?.as_ref());
-                    match known.filter(|_| is_still(collider)) {
-                        Some(inside) => inside.nodes & nodes,
-                        None => {
-                            let (block, pose) = (&plan.blocks[block], &states[index].pose);
-                            Inside::find(plan, block, nodes, (collider, pose), &[], Asked::NODES).nodes
-                        }
-                    }
+            ties.note_still(fields, |block| {
+                near_colliders(plan, &plan.blocks[block], plan.blocks[block].real_nodes(), &still)
+            });
+            ties.tie(plan, field, fields, |index, nodes| {
+                let block = &plan.blocks[index];
+                let others = occupied.iter().enumerate().filter(|(other, _)| *other != field);
+                let touched = others.fold(0, |all, (_, words)| all | words[index]);
+                let gripped = bits(if grips.is_empty() { 0 } else { nodes }).filter(|bit| {
+                    let x = plan.node_place(block, *bit as usize);
+                    grips.iter().any(|load| load.reaches(&x))
                 });
-                all.fold(0, |held, inside| held | inside)
+                let gripped = gripped.fold(0, |all, bit| all | 1 << bit);
+                touched | gripped | near_colliders(plan, block, nodes, &moving)
             });
         });
         self.grid.ties = Some(ties);
