@@ -73,8 +73,11 @@ impl<const D: usize> Run<'_, D> {
         let view = View { leaf_fields: &fields, ..view };
         self.comm.agree(self.recorder.sync())?;
         self.outputs.write(self.comm, &view)?;
-        let maps =
-            if self.comm.rank() == 0 { maps::write(self.problem, &self.solver.maxima) } else { Ok(()) };
+        let maps = if self.comm.rank() == 0 {
+            maps::write(self.problem, &self.solver.measured.maxima)
+        } else {
+            Ok(())
+        };
         self.comm.agree(maps)?;
         if !is_due {
             self.outputs.give_back_number();
@@ -139,7 +142,7 @@ fn view<'a, const D: usize>(
         followed: solver.physics.followed,
         leaf_fields: &[],
         maps: &problem.maps,
-        maxima: &solver.maxima,
+        maxima: &solver.measured.maxima,
         origin: problem.origin,
         root_edge: problem.root_edge,
         brick: problem.brick,

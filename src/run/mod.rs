@@ -223,7 +223,7 @@ impl<'a, const D: usize> Run<'a, D> {
     /// Not collective. Whether the equilibrium is reached that the job asks for.
     fn is_settled(&self) -> bool {
         let solver = &self.solver;
-        solver.physics.equilibrium.is_some_and(|asked| solver.relaxation.is_settled(&asked))
+        solver.physics.equilibrium.is_some_and(|asked| solver.equilibrium.relaxation.is_settled(&asked))
     }
 
     /// Not collective. Whether the stage under way has reached its end; the same on all ranks.
@@ -279,7 +279,7 @@ impl<'a, const D: usize> Run<'a, D> {
     /// Not collective. Tells the user whether equilibrium was reached.
     fn tell_equilibrium(&mut self) {
         let Some(asked) = self.solver.physics.equilibrium else { return };
-        let (Clock { step, time, .. }, way) = (self.solver.clock, self.solver.relaxation);
+        let (Clock { step, time, .. }, way) = (self.solver.clock, self.solver.equilibrium.relaxation);
         let time = quantity(time, "s");
         if self.is_settled() {
             self.recorder.message(&format!("equilibrium at t = {time} (step {step}): {way}"));
@@ -310,7 +310,7 @@ impl<'a, const D: usize> Run<'a, D> {
 
     /// Not collective. Warns of heads of seepage that were not found.
     fn tell_unsettled_heads(&mut self) {
-        let times = self.solver.unsettled_heads;
+        let times = self.solver.sums.unsettled_heads;
         if times > 0 {
             self.recorder.warning(&format!(
                 "water.seepage: {} of its solutions did not settle: the free surface still moved, or the heads had not converged; expected ground that is connected to a head, permeabilities that differ less, or finer cells",
@@ -340,7 +340,7 @@ impl<'a, const D: usize> Run<'a, D> {
         if !self.solver.physics.has_halves {
             return;
         }
-        let mut halved = [self.solver.ledger.halved];
+        let mut halved = [self.solver.adaptation.ledger.halved];
         self.comm.sum_u64(&mut halved);
         if halved[0] > 0 {
             self.recorder.message(&format!(
@@ -349,7 +349,7 @@ impl<'a, const D: usize> Run<'a, D> {
             ));
         }
         let pieces = self.solver.pieces().unwrap_or_default();
-        let bodies = self.problem.bodies.iter().zip(&self.solver.pieces_before).zip(&pieces);
+        let bodies = self.problem.bodies.iter().zip(&self.solver.adaptation.pieces_before).zip(&pieces);
         for ((body, before), now) in bodies.filter(|((_, before), now)| now > before) {
             self.recorder.warning(&format!(
                 "body \"{}\" is in {now} pieces, {before} before it was stretched: boxes of its particles no longer \

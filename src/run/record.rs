@@ -238,9 +238,9 @@ impl<'a, const D: usize> Recorder<'a, D> {
         // The sums restart; if the row of this step was written before, they are zero already.
         let time = solver.time_of_velocities();
         solver.forget_reactions();
-        solver.load_sums.forget(3, time);
-        solver.body_sums.forget(3, time);
-        solver.face_sums.forget(FACE_SUMS, time);
+        solver.sums.loads.forget(3, time);
+        solver.sums.bodies.forget(3, time);
+        solver.sums.faces.forget(FACE_SUMS, time);
         written
     }
 
@@ -254,20 +254,20 @@ impl<'a, const D: usize> Recorder<'a, D> {
     ) -> (Vec<f64>, Vec<Vec<Sample<D>>>) {
         let clock = solver.clock;
         let reactions = solver.reactions();
-        let sources = solver.source_sums.totals(comm);
+        let sources = solver.sums.sources.totals(comm);
         let failed = solver.failed_totals();
-        let pores = solver.pore_sums.totals(comm);
-        let flows = solver.flow_sums.totals(comm);
+        let pores = solver.sums.pores.totals(comm);
+        let flows = solver.sums.flow.totals(comm);
         let loads = solver.load_totals();
         let bodies = solver.body_totals();
         let readings = solver.read_probes(&self.problem.probes);
         let tracked = solver.read_tracks(&self.problem.tracks);
-        let passed = solver.crossings.fluxes.passed(comm, &solver.chunks);
+        let passed = solver.measured.crossings.fluxes.passed(comm, &solver.chunks);
         let samples = solver.read_lines(&self.problem.lines);
         solver.note_maps(&self.problem.maps);
         let faces = solver.face_forces();
-        let crossings = solver.crossings.gather(comm);
-        let ledger = solver.physics.adaptivity.as_ref().map(|_| solver.ledger.total(comm));
+        let crossings = solver.measured.crossings.gather(comm);
+        let ledger = solver.physics.adaptivity.as_ref().map(|_| solver.adaptation.ledger.total(comm));
         let (shift_work, shock_work) = (solver.shift_work(), solver.shock_work());
         if self.history.is_none() {
             return (Vec::new(), samples);
@@ -287,11 +287,13 @@ impl<'a, const D: usize> Recorder<'a, D> {
         if self.problem.has_equilibrium() {
             let seeks = solver.physics.equilibrium.is_some();
             values.extend(
-                seeks.then_some(&solver.relaxation).map_or([f64::NAN; 3], history::relaxation_values),
+                seeks
+                    .then_some(&solver.equilibrium.relaxation)
+                    .map_or([f64::NAN; 3], history::relaxation_values),
             );
         }
         if self.problem.quasi_static.is_some() {
-            values.extend(history::effort_values(&solver.effort));
+            values.extend(history::effort_values(&solver.equilibrium.effort));
         }
         if self.problem.stages.len() > 1 {
             values.push((solver.physics.stage() + 1) as f64);
@@ -331,7 +333,7 @@ impl<'a, const D: usize> Recorder<'a, D> {
 
     /// Collective. Speed, traffic and memory since the last record.
     fn record(&mut self, comm: &Comm, solver: &mut Solver<D>, mass_error: f64) -> Record {
-        let ledger = solver.physics.adaptivity.as_ref().map(|_| solver.ledger.total(comm));
+        let ledger = solver.physics.adaptivity.as_ref().map(|_| solver.adaptation.ledger.total(comm));
         let phases: Vec<(&'static str, f64)> =
             Phase::ALL.iter().map(|phase| phase.name()).zip(solver.phases.seconds()).collect();
         let traffic = solver.traffic();
@@ -353,10 +355,10 @@ impl<'a, const D: usize> Recorder<'a, D> {
                 statistics: solver.statistics(),
                 imbalance: solver.imbalance().0,
                 possible_imbalance: solver.possible_imbalance().0,
-                partitions: solver.partitions,
+                partitions: solver.balance.partitions,
                 mass_error,
                 resampled: ledger.map(|ledger| Resampled {
-                    regrids: solver.regrids,
+                    regrids: solver.adaptation.regrids,
                     splits: ledger.splits,
                     refused: ledger.refused,
                     merges: ledger.merges,
@@ -445,7 +447,7 @@ impl<'a, const D: usize> Recorder<'a, D> {
     /// Collective. The run is over.
     pub fn finish(&mut self, comm: &Comm, solver: &Solver<D>) {
         self.progress.finish(solver.clock.step, solver.clock.time, solver.clock.dt);
-        let crossings = solver.crossings.gather(comm).to_string();
+        let crossings = solver.measured.crossings.gather(comm).to_string();
         if !crossings.is_empty() {
             self.message(&crossings);
         }

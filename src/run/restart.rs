@@ -78,7 +78,7 @@ pub fn scalars<const D: usize>(
     next_output: u64,
     output_step: Option<u64>,
 ) -> Scalars {
-    let mut crossings = solver.crossings.gather(comm);
+    let mut crossings = solver.measured.crossings.gather(comm);
     let mut counts = vec![(NEXT_OUTPUT.into(), next_output)];
     if problem.coordinates == Coordinates::Axisymmetric {
         counts.push((AXISYMMETRIC.into(), 1));
@@ -87,7 +87,7 @@ pub fn scalars<const D: usize>(
     counts.extend(CROSSINGS.iter().map(|name| String::from(*name)).zip(numbers));
     counts.extend(output_step.map(|step| (OUTPUT_STEP.into(), step)));
     if solver.physics.seepage.is_some() {
-        counts.push((UNSETTLED.into(), solver.unsettled_heads));
+        counts.push((UNSETTLED.into(), solver.sums.unsettled_heads));
     }
     let mut reals = vec![(BOUND.into(), solver.clock.bound)];
     let starts = &solver.physics.stage_starts;
@@ -100,28 +100,30 @@ pub fn scalars<const D: usize>(
         .collect();
     measures::write(comm, problem, solver, &mut reals, &mut counts, &mut exact);
     write_exact_sums("collider", &solver.contacts.sums, comm, &mut reals, &mut exact);
-    write_exact_sums("source", &solver.source_sums, comm, &mut reals, &mut exact);
-    write_exact_sums("failed", &solver.failed_sums, comm, &mut reals, &mut exact);
-    write_exact_sums("pore_water", &solver.pore_sums, comm, &mut reals, &mut exact);
-    write_exact_sums("flow", &solver.flow_sums, comm, &mut reals, &mut exact);
-    write_exact_sums("load", &solver.load_sums, comm, &mut reals, &mut exact);
-    write_exact_sums("contact", &solver.body_sums, comm, &mut reals, &mut exact);
-    write_exact_sums("shift", &solver.shift_sums, comm, &mut reals, &mut exact);
-    write_exact_sums("shock", &solver.shock_sums, comm, &mut reals, &mut exact);
-    write_exact_sums("face", &solver.face_sums, comm, &mut reals, &mut exact);
+    write_exact_sums("source", &solver.sums.sources, comm, &mut reals, &mut exact);
+    write_exact_sums("failed", &solver.sums.failed, comm, &mut reals, &mut exact);
+    write_exact_sums("pore_water", &solver.sums.pores, comm, &mut reals, &mut exact);
+    write_exact_sums("flow", &solver.sums.flow, comm, &mut reals, &mut exact);
+    write_exact_sums("load", &solver.sums.loads, comm, &mut reals, &mut exact);
+    write_exact_sums("contact", &solver.sums.bodies, comm, &mut reals, &mut exact);
+    write_exact_sums("shift", &solver.sums.shifts, comm, &mut reals, &mut exact);
+    write_exact_sums("shock", &solver.sums.shocks, comm, &mut reals, &mut exact);
+    write_exact_sums("face", &solver.sums.faces, comm, &mut reals, &mut exact);
     if solver.physics.equilibrium.is_some() {
-        let Relaxation { kinetic, speed, acceleration, stops, phase } = solver.relaxation;
+        let Relaxation { kinetic, speed, acceleration, stops, phase } = solver.equilibrium.relaxation;
         reals.extend(RELAXATION.iter().map(|name| String::from(*name)).zip([kinetic, speed, acceleration]));
         let phase = PHASES.iter().position(|other| *other == phase).unwrap_or_default();
         counts.extend([(STOPS.into(), stops), (PHASE.into(), phase as u64)]);
     }
     if solver.physics.adaptivity.is_none() && !solver.physics.sources.is_empty() {
-        counts.push((LEDGER[3].into(), solver.ledger.next_root));
+        counts.push((LEDGER[3].into(), solver.adaptation.ledger.next_root));
     }
-    counts.extend((0..).zip(&solver.pieces_before).map(|(body, &pieces)| (pieces_name(body), pieces)));
+    counts.extend(
+        (0..).zip(&solver.adaptation.pieces_before).map(|(body, &pieces)| (pieces_name(body), pieces)),
+    );
     if solver.physics.adaptivity.is_some() {
-        let ([splits, _, merges, removed], mut energies) = solver.ledger.gather(comm);
-        let numbers = [splits, merges, removed, solver.ledger.next_root];
+        let ([splits, _, merges, removed], mut energies) = solver.adaptation.ledger.gather(comm);
+        let numbers = [splits, merges, removed, solver.adaptation.ledger.next_root];
         counts.extend(LEDGER.iter().map(|name| String::from(*name)).zip(numbers));
         exact.extend(
             ENERGIES.iter().zip(&mut energies).map(|(name, sum)| ((*name).into(), sum.words().to_vec())),
@@ -210,7 +212,7 @@ fn restore_relaxation<const D: usize>(solver: &mut Solver<D>, scalars: &Scalars)
     let [kinetic, speed, acceleration] = RELAXATION.map(|name| scalars.real(name));
     let phase = *PHASES.get(usize::try_from(scalars.count(PHASE)?).ok()?)?;
     let (kinetic, speed, acceleration, stops) = (kinetic?, speed?, acceleration?, scalars.count(STOPS)?);
-    solver.relaxation = Relaxation { kinetic, speed, acceleration, stops, phase };
+    solver.equilibrium.relaxation = Relaxation { kinetic, speed, acceleration, stops, phase };
     Some(())
 }
 
@@ -228,14 +230,14 @@ const ENERGIES: [&str; 2] = ["split_energy", "merge_energy"];
 fn restore_ledger<const D: usize>(rank: usize, solver: &mut Solver<D>, scalars: &Scalars) -> Option<()> {
     if solver.physics.adaptivity.is_none() {
         if !solver.physics.sources.is_empty() {
-            solver.ledger.next_root = scalars.count(LEDGER[3])?;
+            solver.adaptation.ledger.next_root = scalars.count(LEDGER[3])?;
         }
         return Some(());
     }
     let energy = |name: &str| ExactSum::from_words(scalars.exact(name)?);
     let (split_energy, merge_energy) = (energy(ENERGIES[0])?, energy(ENERGIES[1])?);
     let [splits, merges, removed, next_root] = LEDGER.map(|name| scalars.count(name));
-    let ledger = &mut solver.ledger;
+    let ledger = &mut solver.adaptation.ledger;
     ledger.next_root = next_root?;
     if rank == 0 {
         (ledger.splits, ledger.merges, ledger.removed) = (splits?, merges?, removed?);
@@ -252,7 +254,7 @@ fn restore_crossings<const D: usize>(rank: usize, solver: &mut Solver<D>, scalar
     let fluxes = Fluxes::default();
     let crossings = Crossings { put_back: put_back?, deleted: deleted?, left: left?, masses, fluxes };
     if rank == 0 {
-        solver.crossings = crossings;
+        solver.measured.crossings = crossings;
     }
     Some(())
 }
@@ -388,29 +390,29 @@ fn restored<const D: usize>(
     restore_colliders(&mut solver, scalars)
         .and_then(|()| restore_exact_sums("collider", &mut solver.contacts.sums, rank, scalars))
         .ok_or_else(|| refused("the state of a collider is missing"))?;
-    restore_exact_sums("source", &mut solver.source_sums, rank, scalars)
+    restore_exact_sums("source", &mut solver.sums.sources, rank, scalars)
         .ok_or_else(|| refused("the sums of a source are missing"))?;
-    restore_exact_sums("failed", &mut solver.failed_sums, rank, scalars)
+    restore_exact_sums("failed", &mut solver.sums.failed, rank, scalars)
         .ok_or_else(|| refused("the sums of particles that have failed are missing"))?;
-    restore_exact_sums("pore_water", &mut solver.pore_sums, rank, scalars)
-        .and_then(|()| restore_exact_sums("flow", &mut solver.flow_sums, rank, scalars))
+    restore_exact_sums("pore_water", &mut solver.sums.pores, rank, scalars)
+        .and_then(|()| restore_exact_sums("flow", &mut solver.sums.flow, rank, scalars))
         .ok_or_else(|| refused("the sums of the water in the pores are missing"))?;
-    restore_exact_sums("load", &mut solver.load_sums, rank, scalars)
+    restore_exact_sums("load", &mut solver.sums.loads, rank, scalars)
         .ok_or_else(|| refused("the sums of a load are missing"))?;
-    restore_exact_sums("contact", &mut solver.body_sums, rank, scalars)
+    restore_exact_sums("contact", &mut solver.sums.bodies, rank, scalars)
         .ok_or_else(|| refused("the sums of a contact between bodies are missing"))?;
-    restore_exact_sums("shift", &mut solver.shift_sums, rank, scalars)
+    restore_exact_sums("shift", &mut solver.sums.shifts, rank, scalars)
         .ok_or_else(|| refused("the work of the shift of fluids is missing"))?;
     // A run without them may have written the file: then they begin here.
-    let _ = restore_exact_sums("shock", &mut solver.shock_sums, rank, scalars);
-    let _ = restore_exact_sums("face", &mut solver.face_sums, rank, scalars);
+    let _ = restore_exact_sums("shock", &mut solver.sums.shocks, rank, scalars);
+    let _ = restore_exact_sums("face", &mut solver.sums.faces, rank, scalars);
     restore_relaxation(&mut solver, scalars)
         .ok_or_else(|| refused("the state of the relaxation to equilibrium is missing"))?;
     restore_ledger(comm.rank(), &mut solver, &header.scalars)
         .ok_or_else(|| refused("the ledger of splits and merges is missing"))?;
-    solver.unsettled_heads = header.scalars.count(UNSETTLED).unwrap_or(0);
+    solver.sums.unsettled_heads = header.scalars.count(UNSETTLED).unwrap_or(0);
     let pieces = |body| header.scalars.count(&pieces_name(body));
-    solver.pieces_before = (0..problem.bodies.len()).map_while(pieces).collect();
+    solver.adaptation.pieces_before = (0..problem.bodies.len()).map_while(pieces).collect();
     restore_crossings(comm.rank(), &mut solver, &header.scalars)
         .ok_or_else(|| refused("the counts of particles that left the domain are missing"))?;
     measures::restore(comm.rank(), problem, &mut solver, &header.scalars, path);

@@ -34,22 +34,19 @@ pub use state::{Clock, Effort, Requests, Solver, StepError, StepReport};
 use partition::Forest;
 use partition::comm::{Comm, Disagreement, Traffic};
 
-use self::migration::crossings::Crossings;
 use self::migration::migrate::Moved;
-use crate::adaptivity::resample::ledger::Ledger;
 use crate::grid::KnownTree;
 use crate::leapfrog::Lengths;
 use crate::particle::Chunk;
-use crate::solver::state::bookings::{Contacts, ExactSums};
+use crate::solver::state::bookings::Contacts;
 use crate::solver::state::cost::Costs;
 use crate::solver::state::grid::Grid;
 use crate::solver::state::inside::KnownInside;
 use crate::solver::state::last_partition::LastPartition;
 use crate::solver::state::leaf_data::LeafData;
+use crate::solver::state::parts::{Adaptation, Balance, EquilibriumState, Measured, ParticleForces, Sums};
 use crate::solver::state::phases::{Phase, Phases, thread_time};
-use crate::solver::state::regrid_cache::RegridCache;
-use crate::solver::state::regrid_timers::RegridTimers;
-use crate::solver::state::relaxation::{RelaxPhase, Relaxation};
+use crate::solver::state::relaxation::RelaxPhase;
 
 /// Length of the step before, over the bound on the next, of which half counts as lag at most. Bounds that vary
 /// with the motion stay well below it, and so do those of trees that are refined by a level.
@@ -73,53 +70,34 @@ impl<const D: usize> Solver<D> {
             comm: comm.clone(),
             leaf_data: LeafData::default(),
             contacts: Contacts::new(&physics, clock.time),
-            load_sums: ExactSums::new(physics.loads.len(), clock.time),
-            face_sums: ExactSums::new(if physics.face_forces { 2 * D } else { 0 }, clock.time),
-            body_sums: ExactSums::new(physics.body_contacts.names.len(), clock.time),
-            shift_sums: ExactSums::new(usize::from(physics.has_fluids()), clock.time),
-            shock_sums: ExactSums::new(usize::from(physics.viscosity.is_some()), clock.time),
-            source_sums: ExactSums::new(physics.sources.len(), clock.time),
-            failed_sums: ExactSums::new(usize::from(physics.can_fail()), clock.time),
-            pore_sums: ExactSums::new(usize::from(physics.followed.saturation), clock.time),
-            flow_sums: ExactSums::new(physics.seepage.as_ref().map_or(0, |s| s.heads.len() + 1), clock.time),
-            unsettled_heads: 0,
-            fed: vec![[0; 2]; physics.sources.len()],
-            conveyed: Vec::new(),
-            pushes: Vec::new(),
-            near: Vec::new(),
-            effort: Effort::default(),
-            next_load_step: 0.0,
-            relaxation: Relaxation::default(),
-            motion: Default::default(),
+            sums: Sums::new(&physics, clock.time),
+            particle_forces: ParticleForces::default(),
+            equilibrium: EquilibriumState::default(),
             physics,
             forest,
             chunks,
             clock,
             phases: Phases::default(),
             grid,
-            crossings: Crossings::default(),
-            tracked: Vec::new(),
-            maxima: Vec::new(),
-            ledger: Ledger::default(),
-            regrids: 0,
-            regrid_timers: RegridTimers::default(),
-            regrid_cache: RegridCache::default(),
-            sent_before: Traffic::default(),
-            surface_bytes: 0,
-            costs: Costs::new(clock.step),
-            partitioned,
-            partitions: 0,
-            is_to_weigh: false,
-            weighed: None,
-            has_wide: false,
-            pieces_before: Vec::new(),
+            measured: Measured::default(),
+            adaptation: Adaptation::default(),
+            balance: Balance {
+                sent_before: Traffic::default(),
+                surface_bytes: 0,
+                costs: Costs::new(clock.step),
+                partitioned,
+                partitions: 0,
+                is_to_weigh: false,
+                weighed: None,
+            },
         };
         if let Some(load_steps) = solver.physics.quasi_static {
-            solver.next_load_step = if clock == Clock::default() { load_steps.step } else { clock.bound };
+            solver.equilibrium.next_load_step =
+                if clock == Clock::default() { load_steps.step } else { clock.bound };
         }
         solver.physics.has_halves = solver.find_halves();
         solver.leaf_data.reset(solver.chunks.len());
-        solver.ledger.next_root = solver.first_free_root();
+        solver.adaptation.ledger.next_root = solver.first_free_root();
         let reach = solver.agreed_reach();
         solver.provide_reach(reach);
         if clock == Clock::default() {
@@ -205,7 +183,7 @@ impl<const D: usize> Solver<D> {
     /// How long before the present time the velocities belong to, s: half of the last step; 0 at the start
     /// and where velocities have been set since.
     pub fn lag(&self) -> f64 {
-        match self.relaxation.phase {
+        match self.equilibrium.relaxation.phase {
             _ if self.physics.quasi_static.is_some() => 0.0,
             RelaxPhase::Stopped => 0.0,
             _ => 0.5 * self.clock.dt,
@@ -235,7 +213,7 @@ impl<const D: usize> Solver<D> {
 
     /// Collective. Makes the grid anew for the current tree, partition and width of boxes.
     pub(super) fn rebuild_grid(&mut self, reach: u32) {
-        self.sent_before = self.traffic();
+        self.balance.sent_before = self.traffic();
         // Fresh memory costs as much as the first scatter into it.
         let (arenas, sum_bytes) = (std::mem::take(&mut self.grid.arenas), self.grid.sum_bytes);
         let inside = KnownInside::of(&self.grid.plan, std::mem::take(&mut self.grid.inside_still));
@@ -273,7 +251,7 @@ impl<const D: usize> Solver<D> {
         ];
         self.phases.time(Phase::Reduce, || self.comm.min_f64s(&mut least));
         let [bound, failed, stop, checkpoint, reach, wide, near] = least;
-        self.has_wide = wide < 0.0;
+        self.adaptation.has_wide = wide < 0.0;
         let moved = if failed < 0.0 { self.comm.agree(outcome)? } else { outcome.unwrap_or_default() };
         self.clock.bound = bound;
         self.grid.walls.is_near = near < 0.0;

@@ -28,7 +28,7 @@ impl<const D: usize> Solver<D> {
     pub fn next_root(&self) -> u64 {
         // Roots that merges have used and given up count as well, and those of particles that have left.
         match self.physics.adaptivity.is_some() || !self.physics.sources.is_empty() {
-            true => self.ledger.next_root,
+            true => self.adaptation.ledger.next_root,
             false => self.first_free_root(),
         }
     }
@@ -38,10 +38,10 @@ impl<const D: usize> Solver<D> {
     pub fn enter_stage(&mut self, physics: Physics<D>, change: Change<D>) -> Vec<usize> {
         let mut added = [change.added.iter().map(|chunk| chunk.len() as u64).sum()];
         self.comm.sum_u64(&mut added);
-        self.ledger.next_root = self.next_root() + added[0];
+        self.adaptation.ledger.next_root = self.next_root() + added[0];
         // Velocities that are set belong to the present time; those of bodies that come with others that move
         // count as theirs.
-        let are_set = change.at_rest || self.relaxation.phase == RelaxPhase::Stopped;
+        let are_set = change.at_rest || self.equilibrium.relaxation.phase == RelaxPhase::Stopped;
         // A step without material sets no bound for the growth of the next one.
         if are_set || self.clock.bound == f64::INFINITY {
             self.skip_forces(self.lag());
@@ -55,7 +55,7 @@ impl<const D: usize> Solver<D> {
                 self.contacts.states[index] = collider.state_at(self.clock.time);
             }
         }
-        self.crossings.fluxes.add_beyond(&self.chunks, 1.0);
+        self.measured.crossings.fluxes.add_beyond(&self.chunks, 1.0);
         let had: Vec<usize> = self
             .chunks
             .iter_mut()
@@ -74,14 +74,14 @@ impl<const D: usize> Solver<D> {
         for (chunk, added) in self.chunks.iter_mut().zip(&change.added) {
             (0..added.len()).for_each(|p| chunk.push_from(added, p));
         }
-        self.crossings.fluxes.add_beyond(&self.chunks, -1.0);
+        self.measured.crossings.fluxes.add_beyond(&self.chunks, -1.0);
         self.leaf_data.reset(self.chunks.len());
         // Colliders may have come or gone.
         self.grid.inside_still.clear();
         let reach = self.agreed_reach();
         self.rebuild_grid(reach);
         self.start_from(&had);
-        self.relaxation = Relaxation::default();
+        self.equilibrium.relaxation = Relaxation::default();
         had
     }
 }

@@ -31,7 +31,7 @@ fn rounding_takes_no_particle_out_of_the_domain() {
         let chunk = solver.chunks.iter_mut().find(|chunk| !chunk.is_empty()).expect("particles");
         chunk.column_mut(Layout::<2>::POSITION)[0] = -1e-15;
         solver.step(1e3, Requests::default()).unwrap_or_else(|error| panic!("{error}"));
-        assert_eq!((solver.crossings.put_back, solver.crossings.deleted), (1, 0));
+        assert_eq!((solver.measured.crossings.put_back, solver.measured.crossings.deleted), (1, 0));
         let chunk = solver.chunks.iter_mut().find(|chunk| !chunk.is_empty()).expect("particles");
         assert!((0.0..1e-12).contains(&chunk.position(0)[0]), "{:?}", chunk.position(0));
         chunk.column_mut(Layout::<2>::POSITION)[0] = -1e-3;
@@ -74,7 +74,7 @@ fn no_particle_passes_a_face_ahead_of_its_body() {
         assert!(given > 0.1 * before.abs());
         assert!((momentum(&solver) - before - given).abs() < 1e-12 * before.abs(), "{given} of {before}");
         assert!(solver.chunks.iter().any(|chunk| chunk.ids().contains(&id)));
-        assert_eq!(solver.crossings.put_back, 0);
+        assert_eq!(solver.measured.crossings.put_back, 0);
     });
     if !is_test {
         relaunch(module_path!(), "no_particle_passes_a_face_ahead_of_its_body", 1, 60);

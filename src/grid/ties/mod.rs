@@ -110,7 +110,8 @@ impl<const D: usize> Ties<D> {
         }
         let memory = &mut self.memories[field];
         let known = |block: usize| self.on_faces[block] | self.near_still[block].unwrap_or(0);
-        self.finder.find(plan, fields, &self.filled, memory, |block, nodes| known(block) | held(block, nodes));
+        self.finder
+            .find(plan, fields, &self.filled, memory, |block, nodes| known(block) | held(block, nodes));
         memory.tied.pull(fields);
     }
 

@@ -34,10 +34,10 @@ pub(super) fn write<const D: usize>(
     counts: &mut Vec<(String, u64)>,
     exact: &mut Vec<(String, Vec<i64>)>,
 ) {
-    let mut sums = solver.crossings.fluxes.gather(comm);
+    let mut sums = solver.measured.crossings.fluxes.gather(comm);
     let fluxes = problem.fluxes.iter().zip(&mut sums);
     exact.extend(fluxes.map(|(flux, sum)| (measure("flux", &flux.name, ""), sum.words().to_vec())));
-    for (track, tracked) in problem.tracks.iter().zip(&solver.tracked) {
+    for (track, tracked) in problem.tracks.iter().zip(&solver.measured.tracked) {
         // Halves of an identifier are numbers that counts may be.
         let halves = [("low_", tracked.id & HALF), ("high_", tracked.id >> 32)];
         counts.extend(halves.map(|(half, id)| (measure("track", &track.name, half), id)));
@@ -51,10 +51,10 @@ const HALF: u64 = 0xffff_ffff;
 
 /// Collective. Begins to count at fluxes, to follow tracks, and to record maxima over maps.
 pub(super) fn begin<const D: usize>(problem: &Problem<D>, solver: &mut Solver<D>) {
-    solver.crossings.fluxes = Fluxes::new(&problem.fluxes);
-    solver.crossings.fluxes.add_beyond(&solver.chunks, -1.0);
+    solver.measured.crossings.fluxes = Fluxes::new(&problem.fluxes);
+    solver.measured.crossings.fluxes.add_beyond(&solver.chunks, -1.0);
     solver.begin_tracks(&problem.tracks);
-    solver.maxima = problem.maps.iter().map(Map::nothing).collect();
+    solver.measured.maxima = problem.maps.iter().map(Map::nothing).collect();
 }
 
 /// Takes over the masses of fluxes (on rank 0), the places of tracks and the maxima of maps from the file at
@@ -67,13 +67,13 @@ pub(super) fn restore<const D: usize>(
     path: &Path,
 ) {
     begin(problem, solver);
-    for (flux, sum) in problem.fluxes.iter().zip(&mut solver.crossings.fluxes.sums) {
+    for (flux, sum) in problem.fluxes.iter().zip(&mut solver.measured.crossings.fluxes.sums) {
         let read = scalars.exact(&measure("flux", &flux.name, "")).and_then(ExactSum::from_words);
         if let Some(read) = read {
             *sum = if rank == 0 { read } else { ExactSum::new() };
         }
     }
-    for (track, tracked) in problem.tracks.iter().zip(&mut solver.tracked) {
+    for (track, tracked) in problem.tracks.iter().zip(&mut solver.measured.tracked) {
         let half = |half| scalars.count(&measure("track", &track.name, half));
         let coordinate = |a: usize| scalars.real(&measure("track", &track.name, &format!("{a}_")));
         let place: Option<Vec<f64>> = (0..D).map(coordinate).collect();
@@ -81,7 +81,7 @@ pub(super) fn restore<const D: usize>(
             *tracked = Tracked { id: low | high << 32, place: std::array::from_fn(|a| place[a]) };
         }
     }
-    for (map, maxima) in problem.maps.iter().zip(&mut solver.maxima) {
+    for (map, maxima) in problem.maps.iter().zip(&mut solver.measured.maxima) {
         let [depth, speed] =
             ["depth", "speed"].map(|what| snapshot::map_values(path, &map.name, what, map.len()));
         if let (Some(depth), Some(speed)) = (depth, speed) {

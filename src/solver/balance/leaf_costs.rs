@@ -24,14 +24,14 @@ impl<const D: usize> Solver<D> {
     /// Not collective. Costs of the own leaves in a step, in units that are the same on all ranks.
     pub(super) fn leaf_costs(&self) -> Vec<u64> {
         let leaves = self.chunks.iter().enumerate();
-        leaves.map(|(leaf, chunk)| self.costs.of(chunk, self.kind(leaf))).collect()
+        leaves.map(|(leaf, chunk)| self.balance.costs.of(chunk, self.kind(leaf))).collect()
     }
 
     /// Collective. Turns what all ranks have measured since the last call into costs.
     pub(super) fn agree_on_costs(&mut self) {
         let materials = self.physics.materials.len();
         let seconds = self.phases.running_time(&[Phase::Sort, Phase::Sum, Phase::Nodes]);
-        let steps = self.clock.step - self.costs.agreed_step;
+        let steps = self.clock.step - self.balance.costs.agreed_step;
         let units = |seconds: f64| (seconds / UNIT) as u64;
         // By material and kind: time, particles; then time and number of leaves in node work.
         let mut sums = vec![0u64; 2 * KINDS * materials + 2];
@@ -49,10 +49,10 @@ impl<const D: usize> Solver<D> {
             }
         }
         let threads = rayon::current_num_threads() as f64;
-        nodes[0] = units((seconds - self.costs.agreed_seconds).max(0.0) * threads);
-        (self.costs.agreed_seconds, self.costs.agreed_step) = (seconds, self.clock.step);
+        nodes[0] = units((seconds - self.balance.costs.agreed_seconds).max(0.0) * threads);
+        (self.balance.costs.agreed_seconds, self.balance.costs.agreed_step) = (seconds, self.clock.step);
         self.leaf_data.times.reset(self.chunks.len());
         self.comm.sum_u64(&mut sums);
-        self.costs.take_in(&sums, materials);
+        self.balance.costs.take_in(&sums, materials);
     }
 }

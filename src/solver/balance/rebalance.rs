@@ -83,19 +83,20 @@ impl<const D: usize> Solver<D> {
         self.agree_on_costs();
         let now = self.imbalance().0;
         let time = thread_time();
-        let since = (time - self.partitioned.looked).as_secs_f64();
-        self.partitioned.looked = time;
-        let is_guess = self.costs.are_measured() && std::mem::take(&mut self.partitioned.is_guess);
+        let since = (time - self.balance.partitioned.looked).as_secs_f64();
+        self.balance.partitioned.looked = time;
+        let is_guess =
+            self.balance.costs.are_measured() && std::mem::take(&mut self.balance.partitioned.is_guess);
         if now <= LIMIT {
             return false;
         }
-        let mut slowest = [since, self.partitioned.price];
+        let mut slowest = [since, self.balance.partitioned.price];
         self.comm.max_f64s(&mut slowest);
         let [since, price] = slowest;
         let cuts = self.plan_partition();
         let then = cuts.imbalance();
-        self.partitioned.lost += since * (1.0 - then / now).max(0.0);
-        let pays = Prospect { now, then, lost: self.partitioned.lost, price, is_guess }.pays();
+        self.balance.partitioned.lost += since * (1.0 - then / now).max(0.0);
+        let pays = Prospect { now, then, lost: self.balance.partitioned.lost, price, is_guess }.pays();
         pays && self.move_leaves(cuts)
     }
 
@@ -116,21 +117,21 @@ impl<const D: usize> Solver<D> {
 
     fn move_leaves(&mut self, cuts: Cuts) -> bool {
         let (wall, start) = (Instant::now(), thread_time());
-        self.regrid_timers.begin();
+        self.adaptation.timers.begin();
         let shipment = self.forest.partition_at(&self.comm, cuts);
         if shipment.changed() {
             let chunks = std::mem::take(&mut self.chunks);
             self.chunks = shipment.move_items(&self.comm, chunks, Chunk::append_to, Chunk::from_bytes);
         }
-        self.regrid_timers.end(Part::Partition);
+        self.adaptation.timers.end(Part::Partition);
         // The tree may have changed before, even if no leaf moves now.
         if self.grid.plan.revision != self.forest.revision() {
             self.leaf_data.reset(self.chunks.len());
             self.rebuild_grid(self.agreed_reach());
         }
-        self.regrid_timers.end(Part::Grid);
-        self.partitioned = LastPartition::since(start);
-        self.partitions += u64::from(shipment.changed());
+        self.adaptation.timers.end(Part::Grid);
+        self.balance.partitioned = LastPartition::since(start);
+        self.balance.partitions += u64::from(shipment.changed());
         self.phases.book(Phase::Regrid, wall.elapsed());
         shipment.changed()
     }

@@ -16,7 +16,7 @@ impl<const D: usize> Solver<D> {
         let (coordinates, root_edge) = (self.physics.coordinates, self.physics.root_edge);
         let domain = roots.iter().map(|&n| f64::from(n) * root_edge).product::<f64>()
             * coordinates.around(0.5 * f64::from(roots[0]) * root_edge);
-        for (map, maxima) in maps.iter().zip(&mut self.maxima) {
+        for (map, maxima) in maps.iter().zip(&mut self.measured.maxima) {
             let mut pieces = vec![0_i64; 2 * map.len()];
             let mut speeds = vec![0.0_f64; map.len()];
             for chunk in &self.chunks {

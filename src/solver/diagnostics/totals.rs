@@ -97,12 +97,12 @@ impl<const D: usize> Solver<D> {
     /// sums; on all ranks or none. That is much cheaper than [`Solver::grid_totals`], which scatters once
     /// more.
     pub fn weigh_next_step(&mut self) {
-        self.is_to_weigh = true;
+        self.balance.is_to_weigh = true;
     }
 
     /// Not collective. Adds up the mass of the particles, if that is requested, before a step.
     pub(in crate::solver) fn weigh_particles(&mut self) {
-        if !self.is_to_weigh {
+        if !self.balance.is_to_weigh {
             return;
         }
         let chunks = &self.chunks;
@@ -113,12 +113,12 @@ impl<const D: usize> Solver<D> {
             });
             leaves.reduce(ExactSum::new, together)
         });
-        self.weighed = Some(Weighed { particles, nodes: ExactSum::new() });
+        self.balance.weighed = Some(Weighed { particles, nodes: ExactSum::new() });
     }
 
     /// Not collective. Adds up the mass on the nodes, if that is requested, after a step that has summed it.
     pub(in crate::solver) fn weigh_nodes(&mut self) {
-        if !std::mem::take(&mut self.is_to_weigh) {
+        if !std::mem::take(&mut self.balance.is_to_weigh) {
             return;
         }
         self.note_surface();
@@ -136,13 +136,13 @@ impl<const D: usize> Solver<D> {
             };
             grid.all_fields().map(of_field).fold(ExactSum::new(), together)
         });
-        self.weighed.iter_mut().for_each(|weighed| weighed.nodes = nodes.clone());
+        self.balance.weighed.iter_mut().for_each(|weighed| weighed.nodes = nodes.clone());
     }
 
     /// Collective. Difference between the mass on the real nodes and that of the particles, relative to the
     /// latter, as a step measured it last; `None` if none has since the last call.
     pub fn weighed_mass_error(&mut self) -> Option<f64> {
-        let Weighed { particles, nodes } = self.weighed.take()?;
+        let Weighed { particles, nodes } = self.balance.weighed.take()?;
         let mut sums = [nodes, particles];
         ExactSum::sum_over_ranks(&self.comm, &mut sums);
         let [nodes, particles] = sums.map(|sum| sum.to_f64());

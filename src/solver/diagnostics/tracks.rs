@@ -15,7 +15,7 @@ use crate::solver::state::Solver;
 impl<const D: usize> Solver<D> {
     /// Collective. Begins to follow the particles nearest to the points of tracks.
     pub fn begin_tracks(&mut self, tracks: &[Track<D>]) {
-        self.tracked = tracks
+        self.measured.tracked = tracks
             .iter()
             .map(|track| Tracked { id: self.nearest(track, &track.point), place: track.point })
             .collect();
@@ -47,14 +47,14 @@ impl<const D: usize> Solver<D> {
         let mut is_lost = false;
         for (i, track) in tracks.iter().enumerate() {
             if readings[i].mass <= 0.0 {
-                self.tracked[i].id = self.nearest(track, &self.tracked[i].place);
+                self.measured.tracked[i].id = self.nearest(track, &self.measured.tracked[i].place);
                 is_lost = true;
             }
         }
         if is_lost {
             readings = self.read_families(tracks);
         }
-        for (tracked, readings) in self.tracked.iter_mut().zip(&readings) {
+        for (tracked, readings) in self.measured.tracked.iter_mut().zip(&readings) {
             if readings.mass > 0.0 {
                 tracked.place = readings.mass_place.map(|sum| sum / readings.mass);
             }
@@ -65,7 +65,7 @@ impl<const D: usize> Solver<D> {
     /// Collective. Sums over the family of each track.
     fn read_families(&self, tracks: &[Track<D>]) -> Vec<Readings<D>> {
         let physics = &self.physics;
-        let partials = tracks.iter().zip(&self.tracked).map(|(track, tracked)| {
+        let partials = tracks.iter().zip(&self.measured.tracked).map(|(track, tracked)| {
             let wanted = Wanted::of(self, &track.quantities);
             let leaves = self.chunks.par_iter().with_min_len(16).map(|chunk| {
                 let weight = |p: usize| f64::from(u8::from(ids::are_kin::<D>(chunk.ids()[p], tracked.id)));

@@ -71,14 +71,14 @@ impl<const D: usize> Solver<D> {
             match found {
                 Ok(balance) => {
                     let effort = Effort { cuts, ..balance.effort };
-                    self.effort = effort;
-                    let bound = if cuts > 0 { dt } else { self.next_load_step };
+                    self.equilibrium.effort = effort;
+                    let bound = if cuts > 0 { dt } else { self.equilibrium.next_load_step };
                     let is_fast = effort.newton <= FAST;
                     let grown = if is_fast { GROWTH * bound } else { bound };
                     // Nodes of a longer step than the next may move too far.
                     let far = self.comm.max_f64(unknowns.greatest_way(&balance.way));
                     let allowed = if far > 0.0 { NEARLY * MOST_WAY / far * dt } else { f64::INFINITY };
-                    self.next_load_step = grown.min(allowed).min(settings.step);
+                    self.equilibrium.next_load_step = grown.min(allowed).min(settings.step);
                     let impulses = self.book(&unknowns, &balance.rest, &balance.way, &pulls, dt);
                     return (dt, self.follow(&unknowns, &balance.way, &rates, impulses, dt));
                 }
@@ -162,7 +162,7 @@ impl<const D: usize> Solver<D> {
     ) -> Vec<[ExactSum; SUMS]> {
         let mut impulses = self.no_impulses();
         for &(load, number, force) in pulls.iter().filter(|(_, number, _)| unknowns.owned[*number]) {
-            let sums = &mut self.load_sums.of[load];
+            let sums = &mut self.sums.loads.of[load];
             for a in 0..D {
                 sums[a].add(dt * force[a]);
                 sums[3].add(force[a] * way[number][a]);
@@ -177,7 +177,7 @@ impl<const D: usize> Solver<D> {
                     std::array::from_fn(|a| if is_by(a) { dt * rest[number][a] } else { 0.0 });
                 match held.by {
                     Holder::Grip(load) => {
-                        let sums = &mut self.load_sums.of[load];
+                        let sums = &mut self.sums.loads.of[load];
                         for a in 0..D {
                             sums[a].add(-on_holder[a]);
                             sums[3].add(-on_holder[a] / dt * way[number][a]);
@@ -189,7 +189,7 @@ impl<const D: usize> Solver<D> {
                         touch.book(&self.physics.colliders, &self.contacts.states, &mut impulses);
                     }
                     Holder::Face(face) => {
-                        if let Some(sums) = self.face_sums.of.get_mut(face) {
+                        if let Some(sums) = self.sums.faces.of.get_mut(face) {
                             sums.iter_mut().zip(on_holder).for_each(|(sum, value)| sum.add(value));
                         }
                     }

@@ -46,7 +46,7 @@ impl<const D: usize> Solver<D> {
     /// On all ranks when a particle could not be moved.
     pub(super) fn hold_together(&mut self) -> Result<bool, Disagreement> {
         let Some(cohesion) = &self.physics.cohesion else { return Ok(false) };
-        let halves = std::mem::take(&mut self.has_wide);
+        let halves = std::mem::take(&mut self.adaptation.has_wide);
         let rejoins = self.physics.has_halves && self.clock.step.is_multiple_of(HALVES_EVERY);
         if !halves && !rejoins {
             return Ok(false);
@@ -77,11 +77,11 @@ impl<const D: usize> Solver<D> {
         });
         let done: Vec<(Splits, u64, Vec<f64>)> = done.collect();
         for (splits, merged, energies) in &done {
-            self.ledger.halved += splits.split;
-            self.ledger.enter_splits(splits);
-            (self.ledger.merges, self.ledger.removed) =
-                (self.ledger.merges + merged, self.ledger.removed + merged);
-            energies.iter().for_each(|&energy| self.ledger.merge_energy.add(energy));
+            self.adaptation.ledger.halved += splits.split;
+            self.adaptation.ledger.enter_splits(splits);
+            (self.adaptation.ledger.merges, self.adaptation.ledger.removed) =
+                (self.adaptation.ledger.merges + merged, self.adaptation.ledger.removed + merged);
+            energies.iter().for_each(|&energy| self.adaptation.ledger.merge_energy.add(energy));
         }
         let is_changed = |leaf: usize| done[leaf].0.is_any() || done[leaf].1 > 0;
         let is_any = [done.iter().any(|done| done.0.is_any()), (0..done.len()).any(is_changed)];
@@ -90,7 +90,7 @@ impl<const D: usize> Solver<D> {
         let [is_halved, is_other] = flags.map(|flag| flag > 0);
         if is_halved && !self.physics.has_halves {
             self.physics.has_halves = true;
-            self.pieces_before = self.pieces().unwrap_or_default();
+            self.adaptation.pieces_before = self.pieces().unwrap_or_default();
         }
         if is_other {
             let moved = self.migrate(is_changed).map_err(StepError::from);

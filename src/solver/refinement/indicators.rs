@@ -15,7 +15,7 @@ impl<const D: usize> Solver<D> {
         let (mut beside_empty, mut masses) = (Vec::new(), Vec::new());
         let together = self.grid.fields_together();
         let fields = together.as_ref().unwrap_or(&self.grid.fields);
-        let surroundings = &mut self.regrid_cache.surroundings;
+        let surroundings = &mut self.adaptation.cache.surroundings;
         if adaptivity.needs().exposure {
             surroundings.update(&self.forest, &self.grid.plan);
             // The nodes of a leaf do not show it where the empty one is coarser.
@@ -30,7 +30,7 @@ impl<const D: usize> Solver<D> {
             fields,
             colliders: &self.physics.colliders,
             collider_states: &self.contacts.states,
-            surroundings: &self.regrid_cache.surroundings,
+            surroundings: &self.adaptation.cache.surroundings,
             masses: &masses,
             beside_empty: &beside_empty,
             scheme: self.physics.scheme(),

@@ -70,7 +70,7 @@ impl<const D: usize> Solver<D> {
             _ => return Ok(is_halved),
         };
         let (start, phases) = (Instant::now(), self.phases);
-        self.regrid_timers.begin();
+        self.adaptation.timers.begin();
         if self.leaf_data.maxima.len() != self.chunks.len() {
             self.survey_now();
         }
@@ -79,7 +79,7 @@ impl<const D: usize> Solver<D> {
         let mut looks = self.look_at_levels();
         let mut split_in = self.split_particles(&looks, levels_before.as_deref());
         let is_split = split_in.contains(&true);
-        self.regrid_timers.end(Part::Split);
+        self.adaptation.timers.end(Part::Split);
         if is_new && self.rebalance() {
             // Children may have come with leaves of other ranks.
             split_in = vec![true; self.chunks.len()];
@@ -94,7 +94,7 @@ impl<const D: usize> Solver<D> {
         let [is_other, is_due] = flags.map(|flag| flag > 0);
         let reports = if is_due { self.merge_particles(&looks) } else { Vec::new() };
         let mut merged = is_due && self.comm.any(reports.iter().any(|report| report.merged > 0));
-        self.regrid_timers.end(Part::Merge);
+        self.adaptation.timers.end(Part::Merge);
         if is_other || merged {
             // Children may lie beyond the faces of their leaf. Merged particles do not, but for rounding.
             let is_merged = |leaf: usize| reports.get(leaf).is_some_and(|report| report.merged > 0);
@@ -105,18 +105,18 @@ impl<const D: usize> Solver<D> {
             };
             self.comm.agree(moved)?;
         }
-        self.regrid_timers.end(Part::Migrate);
+        self.adaptation.timers.end(Part::Migrate);
         if is_due {
             merged |= self.reunite_families(&looks)?;
             self.count_tries(&looks, &reports);
-            self.regrid_timers.end(Part::Merge);
+            self.adaptation.timers.end(Part::Merge);
         }
         if is_other {
             // Merged particles are no faster than the fastest of their members.
             self.leaf_data.signal = self.signals_at_rest();
             let bound = self.comm.min_f64(self.local_bound());
             self.clock.bound = self.clock.bound.min(bound);
-            self.regrids += u64::from(is_new);
+            self.adaptation.regrids += u64::from(is_new);
         }
         if is_other || merged {
             // A particle that has moved may have a box that is wide for its new leaf.
@@ -124,7 +124,7 @@ impl<const D: usize> Solver<D> {
             self.comm.max_u64(&mut reach);
             self.provide_reach(reach[0] as u32);
         }
-        self.regrid_timers.end(Part::Migrate);
+        self.adaptation.timers.end(Part::Migrate);
         // All of it counts as one phase.
         self.phases = phases;
         self.phases.book(Phase::Regrid, start.elapsed());
@@ -158,11 +158,11 @@ impl<const D: usize> Solver<D> {
     /// from. The next time is in `steps`.
     fn change_tree(&mut self, steps: u64) -> Option<Vec<u8>> {
         let wishes = self.wishes(steps);
-        self.regrid_timers.end(Part::Criteria);
+        self.adaptation.timers.end(Part::Criteria);
         let revision = self.forest.revision();
-        let settled = self.regrid_cache.settled.as_ref().filter(|settled| settled.revision == revision);
+        let settled = self.adaptation.cache.settled.as_ref().filter(|settled| settled.revision == revision);
         if !self.comm.any(settled.is_none_or(|settled| settled.wishes != wishes)) {
-            self.regrid_timers.end(Part::Tree);
+            self.adaptation.timers.end(Part::Tree);
             return None;
         }
         let adaptivity = self.physics.adaptivity.as_ref()?;
@@ -174,12 +174,12 @@ impl<const D: usize> Solver<D> {
         // 2:1 balance may undo the coarsening.
         let followed = followed.filter(|forest| self.comm.any(forest.leaves() != self.forest.leaves()));
         let Some(followed) = followed else {
-            self.regrid_cache.settled = Some(SettledTree { revision, wishes, marks });
-            self.regrid_timers.end(Part::Tree);
+            self.adaptation.cache.settled = Some(SettledTree { revision, wishes, marks });
+            self.adaptation.timers.end(Part::Tree);
             return None;
         };
         let old = std::mem::replace(&mut self.forest, followed);
-        self.regrid_timers.end(Part::Tree);
+        self.adaptation.timers.end(Part::Tree);
         Some(self.move_to_leaves(old.leaves()))
     }
 

@@ -68,7 +68,7 @@ impl<const D: usize> Solver<D> {
             is_wanted.then(|| resampling.fit(chunk, leaf.level, from))
         });
         let done: Vec<Option<Splits>> = done.collect();
-        let ledger = &mut self.ledger;
+        let ledger = &mut self.adaptation.ledger;
         // Each regrid reports all refusals anew, so the count is that of the present state.
         ledger.refused = 0;
         done.iter().flatten().for_each(|done| ledger.enter_splits(done));
@@ -108,9 +108,9 @@ impl<const D: usize> Solver<D> {
             .collect();
         let mut reports = Vec::with_capacity(done.len());
         for (merged, energies) in done {
-            self.ledger.merges += merged.merged;
-            self.ledger.removed += merged.removed;
-            energies.iter().for_each(|&energy| self.ledger.merge_energy.add(energy));
+            self.adaptation.ledger.merges += merged.merged;
+            self.adaptation.ledger.removed += merged.removed;
+            energies.iter().for_each(|&energy| self.adaptation.ledger.merge_energy.add(energy));
             reports.push(merged);
         }
         reports
@@ -124,15 +124,15 @@ impl<const D: usize> Solver<D> {
         let strangers: u64 = reports.iter().map(|report| report.unnamed.len() as u64).sum();
         let mut total = [strangers];
         self.comm.sum_u64(&mut total);
-        if total[0] > 0 && self.ledger.next_root + total[0] <= ids::roots(D) {
-            let mut root = self.ledger.next_root + self.comm.exclusive_sum_u64(strangers);
+        if total[0] > 0 && self.adaptation.ledger.next_root + total[0] <= ids::roots(D) {
+            let mut root = self.adaptation.ledger.next_root + self.comm.exclusive_sum_u64(strangers);
             for (chunk, report) in self.chunks.iter_mut().zip(&reports) {
                 for &p in &report.unnamed {
                     chunk.ids_mut()[p as usize] = root;
                     root += 1;
                 }
             }
-            self.ledger.next_root += total[0];
+            self.adaptation.ledger.next_root += total[0];
         }
         reports
     }
@@ -178,6 +178,6 @@ impl<const D: usize> Solver<D> {
 
     /// Enters splits on the way to other leaves in the ledger.
     pub(in crate::solver) fn book_entries(&mut self, splits: &[Splits]) {
-        splits.iter().for_each(|done| self.ledger.enter_splits(done));
+        splits.iter().for_each(|done| self.adaptation.ledger.enter_splits(done));
     }
 }

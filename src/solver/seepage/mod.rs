@@ -22,14 +22,15 @@ use self::heads::{Heads, Held};
 use self::nodes::Nodes;
 use crate::solver::state::Solver;
 use crate::solver::state::grid::Grid;
+use crate::solver::state::parts::Sums;
 use crate::solver::state::phases::Phase;
 
 impl<const D: usize> Solver<D> {
     /// Collective. Finds the heads of the water that seeps at the present time, and gives them to the
     /// particles. Returns the number of nodes where each head is held; nothing where no water seeps.
     pub fn find_heads(&mut self) -> Vec<u64> {
-        let Self { comm, physics, chunks, clock, contacts, grid, phases, flow_sums, .. } = self;
-        let unsettled = &mut self.unsettled_heads;
+        let Self { comm, physics, chunks, clock, contacts, grid, phases, sums, .. } = self;
+        let Sums { flow, unsettled_heads, .. } = sums;
         let (Some(seepage), Some((load, water))) = (&physics.seepage, physics.water_at(clock.time)) else {
             return Vec::new();
         };
@@ -47,9 +48,9 @@ impl<const D: usize> Solver<D> {
             let mut heads = Heads::new(&mut nodes, &ground, &held, is_covered);
             let all = heads.held(comm, count);
             let is_found = heads.find(&mut nodes, &mut ground);
-            *unsettled += u64::from(!is_found);
+            *unsettled_heads += u64::from(!is_found);
             let inflows = heads.inflows(&mut nodes, &ground, count);
-            flow_sums.of = inflows.into_iter().map(|sum| [sum]).collect();
+            flow.of = inflows.into_iter().map(|sum| [sum]).collect();
             nodes.set(&heads.nodes, &heads.values);
             let about = nodes.at_particles(&ground, chunks);
             chunks.par_iter_mut().for_each(|chunk| chunk.carry(carried));

@@ -2,6 +2,7 @@
 //!
 //! | file | what it holds |
 //! |---|---|
+//! | [`parts`] | sums, forces on particles, measures, equilibrium, adaptation, balance |
 //! | [`grid`] | plan, arenas, fields and exchanges of one tree and partition |
 //! | `inside` | nodes inside colliders, and the surfaces that they are behind |
 //! | `walls` | nodes near surfaces that hold material back |
@@ -13,29 +14,19 @@
 //! | [`relaxation`] | the way to equilibrium |
 //! | [`phases`], [`regrid_timers`] | timers |
 use partition::Forest;
-use partition::comm::{Comm, Traffic};
+use partition::comm::Comm;
 
 use self::grid::Grid;
-use super::migration::crossings::Crossings;
+use self::parts::{Adaptation, Balance, EquilibriumState, Measured, ParticleForces, Sums};
 use super::migration::migrate::{MigrateError, Moved};
 use super::sorting::bins::BinMissing;
-use crate::adaptivity::resample::ledger::Ledger;
 use crate::exact_sum::ExactSum;
-use crate::material::SHOCK_SUMS;
 use crate::particle::Chunk;
-use crate::probe::{Maxima, Tracked};
 use crate::quantity::{FACES, NotFinite};
 use crate::solver::physics::Physics;
-use crate::solver::state::bookings::{
-    Contacts, ExactSums, FACE_SUMS, FAILED_SUMS, LOAD_SUMS, Near, ParticlePush, SOURCE_SUMS, SourcePush,
-};
-use crate::solver::state::cost::Costs;
-use crate::solver::state::last_partition::LastPartition;
+use crate::solver::state::bookings::Contacts;
 use crate::solver::state::leaf_data::LeafData;
 use crate::solver::state::phases::Phases;
-use crate::solver::state::regrid_cache::RegridCache;
-use crate::solver::state::regrid_timers::RegridTimers;
-use crate::solver::state::relaxation::Relaxation;
 
 pub mod bookings;
 pub mod cost;
@@ -44,6 +35,7 @@ pub(super) mod inside;
 pub(super) mod last_partition;
 pub mod leaf_data;
 pub(super) mod node_fill;
+pub mod parts;
 pub mod phases;
 pub(super) mod regrid_cache;
 pub mod regrid_timers;
@@ -170,81 +162,21 @@ pub struct Solver<const D: usize> {
     pub clock: Clock,
     /// States of the colliders, and their reactions.
     pub contacts: Contacts<D>,
-    /// Impulse of each load since the last row of the history, and its work since the start.
-    pub load_sums: ExactSums<LOAD_SUMS>,
-    /// Impulse on each face of the domain since the last row, kg m/s: lower and upper along each axis; empty
-    /// if the job does not ask for them.
-    pub face_sums: ExactSums<FACE_SUMS>,
-    /// Impulse of each contact between bodies since the last row of the history, and its work since the
-    /// start.
-    pub body_sums: ExactSums<LOAD_SUMS>,
-    /// Work of the shifts that keep fluids in their volume since the start, J; none without fluids.
-    pub shift_sums: ExactSums<1>,
-    /// Work of artificial viscosity since the start and the part of it that is heat of the material, J; none
-    /// without.
-    pub shock_sums: ExactSums<SHOCK_SUMS>,
-    /// Mass, momentum and kinetic energy that sources have added since the start.
-    pub source_sums: ExactSums<SOURCE_SUMS>,
-    /// Particles that have failed and gone since the start, with what went with them; none where none can.
-    pub failed_sums: ExactSums<FAILED_SUMS>,
-    /// Mass, momentum and energy of the water that has come into pores since the start; none where ground
-    /// weighs the same with and without it.
-    pub pore_sums: ExactSums<SOURCE_SUMS>,
-    /// Flow into the ground at each head that is held, and last through its surface, m³/s; none where no
-    /// water seeps.
-    pub flow_sums: ExactSums<1>,
-    /// How often heads have been looked for in vain since the start of this process.
-    pub unsettled_heads: u64,
-    /// Particles that each source has fed on this rank since the start of this process, and those among them
-    /// that entered where other material was.
-    pub fed: Vec<[u64; 2]>,
-    /// Impulse and work of sources on particles in their shapes in the last step, by own leaf; empty without
-    /// sources.
-    pub(super) conveyed: Vec<Vec<SourcePush<D>>>,
-    /// Forces that particles carried in the last step, by own leaf; empty without such loads.
-    pub(super) pushes: Vec<Vec<ParticlePush<D>>>,
-    /// Particles near colliders that act on particles, by own leaf; empty without such colliders.
-    pub(super) near: Vec<Vec<Near<D>>>,
-    /// How the last load step went.
-    pub effort: Effort,
-    /// Length of the next load step, s, unless something is due earlier.
-    pub(super) next_load_step: f64,
-    /// Progress of kinetic damping towards equilibrium.
-    pub relaxation: Relaxation,
-    /// Kinetic energy (J) and mass (kg) of the nodes of this rank in the last step, in jobs that ask for
-    /// equilibrium.
-    pub(super) motion: [ExactSum; 3],
+    /// Impulses, work and masses summed for the history.
+    pub sums: Sums,
+    /// Forces on particles themselves in the last step.
+    pub(super) particle_forces: ParticleForces<D>,
+    /// The way to equilibrium.
+    pub equilibrium: EquilibriumState,
     /// Wall time by phase since the last report.
     pub phases: Phases,
     pub(super) grid: Grid<D>,
     /// Data of each own leaf.
     pub(super) leaf_data: LeafData<D>,
-    /// Particles that crossed the faces of the domain so far.
-    pub crossings: Crossings,
-    /// Particles that are followed.
-    pub tracked: Vec<Tracked<D>>,
-    /// Largest values of maps so far; the same on all ranks.
-    pub maxima: Vec<Maxima>,
-    /// Splits and merges of particles so far.
-    pub ledger: Ledger,
-    /// Changes of the tree since the start of this process.
-    pub regrids: u64,
-    /// Wall time of the parts of regrids since the start of this process.
-    pub regrid_timers: RegridTimers,
-    /// Data kept from one regrid to the next; no bit of the state depends on it.
-    pub(super) regrid_cache: RegridCache<D>,
-    /// Messages and bytes that grids of earlier trees and partitions have sent.
-    pub(super) sent_before: Traffic,
-    /// Least bytes that the exchanged nodes need, in the last step that measured the mass error.
-    pub(super) surface_bytes: u64,
-    pub(super) costs: Costs,
-    pub(super) partitioned: LastPartition,
-    /// New partitions since the start of this process.
-    pub partitions: u64,
-    pub(super) is_to_weigh: bool,
-    pub(super) weighed: Option<Weighed>,
-    /// Whether boxes of any rank may have to be halved after this step.
-    pub(super) has_wide: bool,
-    /// In how many pieces each body was when the first particle was halved; empty where that is not known.
-    pub pieces_before: Vec<u64>,
+    /// Measures that go on over the run.
+    pub measured: Measured<D>,
+    /// Changes of the tree, and of particles with it.
+    pub adaptation: Adaptation<D>,
+    /// Measured work and traffic, and what follows for the partition.
+    pub balance: Balance,
 }

@@ -196,8 +196,9 @@ impl<const D: usize> Solver<D> {
             middle,
             kick: lengths.kick,
         };
-        self.pushes.resize_with(self.chunks.len(), Vec::new);
-        let leaves = self.chunks.par_iter_mut().zip(&mut self.pushes).enumerate().with_min_len(32);
+        self.particle_forces.loads.resize_with(self.chunks.len(), Vec::new);
+        let leaves =
+            self.chunks.par_iter_mut().zip(&mut self.particle_forces.loads).enumerate().with_min_len(32);
         self.phases.time(Phase::Scatter, || {
             let before = leaves.map(|(leaf, (chunk, pushes))| {
                 pushes.clear();
@@ -236,8 +237,8 @@ impl<const D: usize> Solver<D> {
     /// Not collective. Adds impulse and work of the forces on particles to the sums of the loads, after
     /// particles have moved.
     pub(in crate::solver) fn book_pushes(&mut self, Lengths { kick, .. }: Lengths) {
-        for push in self.pushes.iter().flatten() {
-            let sums = &mut self.load_sums.of[push.load as usize];
+        for push in self.particle_forces.loads.iter().flatten() {
+            let sums = &mut self.sums.loads.of[push.load as usize];
             for a in 0..D {
                 sums[a].add(kick * push.force[a]);
                 sums[3].add(push.force[a] * push.way[a]);

@@ -64,8 +64,8 @@ impl<const D: usize> Solver<D> {
     pub fn traffic(&self) -> Traffic {
         let now = self.grid.traffic();
         Traffic {
-            messages: self.sent_before.messages + now.messages,
-            bytes: self.sent_before.bytes + now.bytes,
+            messages: self.balance.sent_before.messages + now.messages,
+            bytes: self.balance.sent_before.bytes + now.bytes,
         }
     }
 
@@ -82,7 +82,7 @@ impl<const D: usize> Solver<D> {
     /// Not collective. Records the data of the surface between partitions, while the arenas are those of the
     /// present tree.
     pub(in crate::solver) fn note_surface(&mut self) {
-        self.surface_bytes = surface_bytes(&self.grid.exchange, &self.grid.plan, &self.grid.arenas);
+        self.balance.surface_bytes = surface_bytes(&self.grid.exchange, &self.grid.plan, &self.grid.arenas);
     }
 
     /// Collective. Parts of the tree on this rank, and messages of its last exchange.
@@ -93,7 +93,7 @@ impl<const D: usize> Solver<D> {
             ghost_leaves: tree.ghost_len() as u64,
             neighbours: exchange.neighbours().len() as u64,
             arena_bytes: self.grid.sum_bytes,
-            surface_bytes: self.surface_bytes,
+            surface_bytes: self.balance.surface_bytes,
             grid_bytes: self.grid.heap_bytes() as u64,
         }
     }
@@ -106,7 +106,7 @@ impl<const D: usize> Solver<D> {
     ) -> Result<Moved, MigrateError> {
         let scheme = self.physics.scheme();
         let resampling = Resampling::new(self.physics.adaptivity.as_ref(), &scheme, self.grid.plan.extent());
-        let (grid, chunks, crossings) = (&mut self.grid, &mut self.chunks, &mut self.crossings);
+        let (grid, chunks, crossings) = (&mut self.grid, &mut self.chunks, &mut self.measured.crossings);
         let mut splits = Vec::new();
         let moved = self.phases.time(Phase::Migrate, || {
             let (tree, resampling) = (&grid.plan.tree, resampling.as_ref());
@@ -125,7 +125,7 @@ impl<const D: usize> Solver<D> {
         &mut self,
         departed: Vec<Departed>,
     ) -> Result<Moved, MigrateError> {
-        let (grid, chunks, crossings) = (&mut self.grid, &mut self.chunks, &mut self.crossings);
+        let (grid, chunks, crossings) = (&mut self.grid, &mut self.chunks, &mut self.measured.crossings);
         let mut splits = Vec::new();
         let moved = self.phases.time(Phase::Migrate, || {
             grid.migration.arrive(&grid.plan.tree, chunks, departed, &mut splits, crossings)

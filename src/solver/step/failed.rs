@@ -148,7 +148,7 @@ fn state<const D: usize>(chunk: &Chunk<D>, p: usize) -> State {
 impl<const D: usize> Solver<D> {
     /// Not collective. Adds what the failed particles of a step contribute to the sums.
     pub(super) fn book_failed(&mut self) {
-        let Some(sums) = self.failed_sums.of.first_mut() else { return };
+        let Some(sums) = self.sums.failed.of.first_mut() else { return };
         for one in self.leaf_data.failed.iter().flatten() {
             for (sum, value) in sums.iter_mut().zip(one).filter(|(_, value)| **value != 0.0) {
                 sum.add(*value);
@@ -158,6 +158,6 @@ impl<const D: usize> Solver<D> {
 
     /// Collective. Sums over all particles that have failed and gone since the start; `None` where none can.
     pub fn failed_totals(&self) -> Option<[f64; FAILED_SUMS]> {
-        self.failed_sums.totals(&self.comm).first().copied()
+        self.sums.failed.totals(&self.comm).first().copied()
     }
 }

@@ -182,9 +182,9 @@ impl<const D: usize> Solver<D> {
         let watch = adaptivity.map(|adaptivity| adaptivity.watch(self.clock.step + 1));
         let looks_at_widths = self.looks_at_widths(self.clock.step + 1);
         self.leaf_data.begin_gather(&self.chunks);
-        self.pushes.resize_with(self.chunks.len(), Vec::new);
-        self.near.resize_with(self.chunks.len(), Vec::new);
-        self.conveyed.resize_with(self.chunks.len(), Vec::new);
+        self.particle_forces.loads.resize_with(self.chunks.len(), Vec::new);
+        self.particle_forces.near.resize_with(self.chunks.len(), Vec::new);
+        self.particle_forces.conveyed.resize_with(self.chunks.len(), Vec::new);
         let following = self.physics.loads.iter().filter_map(Load::carried);
         let following: Vec<&Carried<D>> = following.filter(|carried| carried.follows()).collect();
         let flows = self.physics.flows(self.clock.time, dt);
@@ -210,12 +210,12 @@ impl<const D: usize> Solver<D> {
             tensors: self.physics.tensor_columns(),
             conveyors: conveyors(&self.physics, self.clock.time),
             failures: Failures::new(&self.physics, to - 0.5 * dt),
-            openings: self.crossings.fluxes.openings(),
+            openings: self.measured.crossings.fluxes.openings(),
             fill: fill.as_ref().filter(|_| !flows.is_empty()).map(|fill| &fill.of_nodes[..]),
             flows,
         };
-        let (chunks, pushes) = (&mut self.chunks, &mut self.pushes);
-        let (near, conveyed) = (&mut self.near, &mut self.conveyed);
+        let (chunks, pushes) = (&mut self.chunks, &mut self.particle_forces.loads);
+        let (near, conveyed) = (&mut self.particle_forces.near, &mut self.particle_forces.conveyed);
         let departed = self.phases.time(Phase::Gather, || {
             let leaves = chunks.par_iter_mut().zip(lists.by_leaf()).zip(maxima).zip(signal);
             let leaves = leaves
@@ -241,7 +241,7 @@ impl<const D: usize> Solver<D> {
         self.book_struck();
         self.book_failed();
         self.book_shocks();
-        if !self.shift_sums.of.is_empty() {
+        if !self.sums.shifts.of.is_empty() {
             let shifts = std::mem::take(&mut self.leaf_data.shifts);
             self.book_shifts(&shifts, to - 0.5 * dt);
             self.leaf_data.shifts = shifts;

@@ -85,7 +85,7 @@ impl<const D: usize> Solver<D> {
     pub(in crate::solver) fn book_loads(&mut self, pushes: &[Push<D>]) {
         for push in pushes {
             let row = &self.grid.fields.rows[push.node].0;
-            let sums = &mut self.load_sums.of[push.load];
+            let sums = &mut self.sums.loads.of[push.load];
             for a in 0..D {
                 sums[a].add(push.impulse[a]);
                 // A product of two numbers, rounded once; the sum is exact.
@@ -96,6 +96,6 @@ impl<const D: usize> Solver<D> {
 
     /// Collective. Mean force and work of each load.
     pub fn load_totals(&self) -> Vec<ForceAndWork> {
-        self.load_sums.force_and_work(&self.comm, self.time_of_velocities())
+        self.sums.loads.force_and_work(&self.comm, self.time_of_velocities())
     }
 }

@@ -78,7 +78,7 @@ impl<const D: usize> Solver<D> {
         let gaps = self.physics.gaps(&grid.walls, &solids, field);
         let (contacts, absorbing, start) = (faces, Some(absorbing), &grid.increments.start[..]);
         let faces = Faces { contacts, gaps, absorbing, start, origin: *origin, middle, kick: lengths.kick };
-        let (plan, sums) = (&grid.plan, &mut self.face_sums.of);
+        let (plan, sums) = (&grid.plan, &mut self.sums.faces.of);
         self.phases.time(Phase::Nodes, || {
             if sums.is_empty() || !is_step {
                 return apply_faces(&mut grid.fields, plan, &faces, |_, _, _| ());
@@ -97,8 +97,8 @@ impl<const D: usize> Solver<D> {
     /// upper along each axis; empty if not needed.
     pub fn face_forces(&self) -> Vec<[f64; 3]> {
         let time = self.time_of_velocities();
-        let mean = |impulse: f64| self.face_sums.mean(impulse, time);
-        self.face_sums.totals(&self.comm).into_iter().map(|impulse| impulse.map(mean)).collect()
+        let mean = |impulse: f64| self.sums.faces.mean(impulse, time);
+        self.sums.faces.totals(&self.comm).into_iter().map(|impulse| impulse.map(mean)).collect()
     }
 
     /// Not collective. `v_j = Σ c v_i` on constrained nodes from their parents; with FLIP and XPIC the

@@ -32,7 +32,7 @@ impl<const D: usize> Solver<D> {
             all.iter_mut().zip(&part).for_each(|(all, part)| all.merge(part));
             all
         };
-        self.motion = self.phases.time(Phase::Nodes, || {
+        self.equilibrium.motion = self.phases.time(Phase::Nodes, || {
             let of_field = |fields: &NodeFields<D>| {
                 let blocks = fields.rows.par_chunks(nodes).zip(&plan.blocks).zip(&fields.active);
                 let sums = blocks.with_min_len(32).filter(|(_, active)| **active).fold(
@@ -63,25 +63,25 @@ impl<const D: usize> Solver<D> {
     /// that is `lag` before, s: no force acts in between, and means over the history leave that out.
     pub(in crate::solver) fn skip_forces(&mut self, lag: f64) {
         self.contacts.sums.since += lag;
-        self.load_sums.since += lag;
-        self.face_sums.since += lag;
-        self.body_sums.since += lag;
+        self.sums.loads.since += lag;
+        self.sums.faces.since += lag;
+        self.sums.bodies.since += lag;
     }
 
     /// Collective. Sets velocities to 0 after a step in which the kinetic energy fell, in jobs that relax to
     /// equilibrium. True once that is reached.
     pub(in crate::solver) fn relax(&mut self, lengths: Lengths) -> bool {
         let Some(asked) = self.physics.equilibrium else { return false };
-        let (comm, motion) = (&self.comm, &mut self.motion);
+        let (comm, motion) = (&self.comm, &mut self.equilibrium.motion);
         self.phases.time(Phase::Reduce, || ExactSum::sum_over_ranks(comm, motion));
-        let [kinetic, mass, scaled] = self.motion.each_ref().map(ExactSum::to_f64);
+        let [kinetic, mass, scaled] = self.equilibrium.motion.each_ref().map(ExactSum::to_f64);
         let pulled = if self.physics.has_scaled_masses() { scaled } else { kinetic };
         let lag = self.lag();
-        if self.relaxation.note([kinetic, pulled], mass, lengths.kick) {
+        if self.equilibrium.relaxation.note([kinetic, pulled], mass, lengths.kick) {
             self.chunks.iter_mut().for_each(stop);
             self.skip_forces(lag);
         }
-        self.relaxation.is_settled(&asked)
+        self.equilibrium.relaxation.is_settled(&asked)
     }
 }
 

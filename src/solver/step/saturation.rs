@@ -114,9 +114,9 @@ impl<const D: usize> Solver<D> {
                 chunk.write(Layout::<D>::MASS, p, &[mass * ratio]);
                 let (place, velocity) = (chunk.position(p), chunk.read(Layout::<D>::VELOCITY, p));
                 let come = Come { place, velocity, mass: mass * ratio - mass };
-                self.crossings.fluxes.book_fed(&come.place, come.mass);
+                self.measured.crossings.fluxes.book_fed(&come.place, come.mass);
                 if self.clock.step > 0 {
-                    come.book(&mut self.pore_sums.of[0], &gravity);
+                    come.book(&mut self.sums.pores.of[0], &gravity);
                 }
             }
         }

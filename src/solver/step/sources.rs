@@ -103,8 +103,8 @@ fn square<const D: usize>(velocity: &[f64; D]) -> f64 {
 impl<const D: usize> Solver<D> {
     /// Not collective. Adds the impulse and work of sources on particles in their shapes to the sums.
     pub(in crate::solver) fn book_conveyed(&mut self) {
-        for push in self.conveyed.iter().flatten() {
-            let sums = &mut self.source_sums.of[push.source as usize];
+        for push in self.particle_forces.conveyed.iter().flatten() {
+            let sums = &mut self.sums.sources.of[push.source as usize];
             (0..D).for_each(|a| sums[1 + a].add(push.impulse[a]));
             sums[4].add(push.work);
         }
@@ -114,7 +114,8 @@ impl<const D: usize> Solver<D> {
     /// ranks number all particles, and make those in their own leaves; behind the arrivals there, as if they
     /// came from leaves at the end of the curve.
     pub(in crate::solver) fn feed(&mut self, to: f64) {
-        let Self { physics, grid, chunks, leaf_data, crossings, ledger, source_sums, fed, clock, .. } = self;
+        let Self { physics, grid, chunks, leaf_data, measured, adaptation, sums, clock, .. } = self;
+        let (ledger, fluxes) = (&mut adaptation.ledger, &mut measured.crossings.fluxes);
         let (plan, extent) = (&grid.plan, grid.plan.extent());
         for (number, source) in physics.sources.iter().enumerate() {
             let layers = source.layers_before(clock.time)..source.layers_before(to);
@@ -141,15 +142,15 @@ impl<const D: usize> Solver<D> {
                     let known = tree.locate(position_key(x, tree.brick().roots, physics.root_edge));
                     let Some(leaf) = known.and_then(|known| tree.local(known)) else { continue };
                     let chunk = &mut chunks[leaf];
-                    fed[number][0] += 1;
-                    fed[number][1] += u64::from(is_taken(chunk, &x, 0.5 * source.spacing));
+                    sums.fed[number][0] += 1;
+                    sums.fed[number][1] += u64::from(is_taken(chunk, &x, 0.5 * source.spacing));
                     columns[Layout::<D>::POSITION..][..D].copy_from_slice(&x);
                     let words: Vec<u64> = columns.iter().map(|value| value.to_bits()).collect();
                     chunk.push_words(&words, id, tag, &[]);
                     let signal = &mut leaf_data.signal[leaf];
                     *signal = signal.max(physics.signal_of(source, plan.finest_cell(leaf)));
-                    crossings.fluxes.book_fed(&x, source.mass);
-                    let sums = &mut source_sums.of[number];
+                    fluxes.book_fed(&x, source.mass);
+                    let sums = &mut sums.sources.of[number];
                     sums[0].add(source.mass);
                     (0..D).for_each(|a| sums[1 + a].add(source.mass * source.velocity[a]));
                     sums[4].add(0.5 * source.mass * square(&source.velocity));
@@ -161,7 +162,7 @@ impl<const D: usize> Solver<D> {
     /// Collective. Particles that each source has fed since the start of this process, and those among them
     /// that entered where other material was.
     pub fn fed_totals(&self) -> Vec<[u64; 2]> {
-        let mut all = self.fed.clone();
+        let mut all = self.sums.fed.clone();
         self.comm.sum_u64(all.as_flattened_mut());
         all
     }

@@ -33,7 +33,7 @@ impl<const D: usize> Solver<D> {
     /// are slower by √s.
     pub(in crate::solver) fn local_bound(&self) -> f64 {
         if self.physics.quasi_static.is_some() {
-            return self.next_load_step;
+            return self.equilibrium.next_load_step;
         }
         let plan = &self.grid.plan;
         // Scaled so that no square overflows.

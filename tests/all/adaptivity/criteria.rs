@@ -160,7 +160,7 @@ fn velocity_gradient() {
         with(comm, &flying, |solver| {
             advance(solver, 20);
             assert!(filled(solver).iter().all(|leaf| leaf.level == 0));
-            assert_eq!(solver.regrids, 0);
+            assert_eq!(solver.adaptation.regrids, 0);
         });
     });
 }
@@ -227,10 +227,10 @@ where
 {
     let mut solver = solver::<D>(comm, text);
     advance(&mut solver, 6);
-    let regrids = solver.regrids;
+    let regrids = solver.adaptation.regrids;
     advance(&mut solver, 100);
-    assert_eq!(solver.regrids, regrids, "leaves flicker");
-    let total = solver.ledger.total(comm);
+    assert_eq!(solver.adaptation.regrids, regrids, "leaves flicker");
+    let total = solver.adaptation.ledger.total(comm);
     assert_eq!((total.splits, total.merges), (0, 0), "{total:?}");
 }
 

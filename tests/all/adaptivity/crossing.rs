@@ -36,7 +36,7 @@ where
         let off = (after.0[a] - before.0[a] - way).abs().max((after.1[a] - before.1[a] - way).abs());
         assert!(off <= 1e-10, "axis {a}: the body's end is off by {off:e} m");
     }
-    let total = solver.ledger.total(comm);
+    let total = solver.adaptation.ledger.total(comm);
     println!(
         "{number} particles, at most {most}, at the end {}; stress at most {stress:e} Pa; {total:?}",
         count(&solver)

@@ -63,22 +63,22 @@ where
             let off = norm(&std::array::from_fn(|k| now[k] - then[k])) / norm(then);
             assert!(off <= 1e-12, "quantity {quantity} is off by {off:e} after part {part}");
         }
-        let total = solver.ledger.total(comm);
+        let total = solver.adaptation.ledger.total(comm);
         assert!(total.merge_energy >= booked, "losses are not taken back");
         booked = total.merge_energy;
         assert_eq!(number + total.splits * ((1 << D) - 1) - total.removed, count(&solver));
     }
     // Families that were just left take their time.
     advance(&mut solver, 4 * STEPS_PER_SWEEP);
-    let total = solver.ledger.total(comm);
+    let total = solver.adaptation.ledger.total(comm);
     let energy_after = energy(&solver);
     println!(
         "{number} particles, at most {most}, at the end {}; {} changes of the tree; {total:?}; energy {energy_before} \
          became {energy_after} J",
         count(&solver),
-        solver.regrids
+        solver.adaptation.regrids
     );
-    assert!(most > 2 * number && total.refused == 0 && solver.regrids >= changes);
+    assert!(most > 2 * number && total.refused == 0 && solver.adaptation.regrids >= changes);
     assert!(booked > 0.0 && total.merges >= 9 * number, "{total:?}");
     assert!(solver.forest.leaves().iter().all(|leaf| leaf.level == 0));
     assert_eq!(count(&solver), number, "families find together again");

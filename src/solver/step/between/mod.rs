@@ -63,6 +63,6 @@ impl<const D: usize> Solver<D> {
     /// Collective. Mean force of each contact of the job on its first side since the last row of the history,
     /// and its work since the start.
     pub fn body_totals(&self) -> Vec<ForceAndWork> {
-        self.body_sums.force_and_work(&self.comm, self.time_of_velocities())
+        self.sums.bodies.force_and_work(&self.comm, self.time_of_velocities())
     }
 }

@@ -108,7 +108,7 @@ impl<const D: usize> Solver<D> {
                 fields.rows[node].0[..D].copy_from_slice(&velocity);
             }
             for Booked { contact, impulse, work } in booked {
-                let sums = &mut self.body_sums.of[usize::from(contact)];
+                let sums = &mut self.sums.bodies.of[usize::from(contact)];
                 sums.iter_mut().zip(impulse).for_each(|(sum, value)| sum.add(value));
                 sums[3].add(work);
             }

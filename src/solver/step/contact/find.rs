@@ -37,8 +37,9 @@ impl<const D: usize> Solver<D> {
         let group = self.physics.group(field);
         let widths = self.physics.widths(&self.grid.plan);
         let (plan, extent) = (&self.grid.plan, self.grid.plan.extent());
-        self.near.resize_with(self.chunks.len(), Vec::new);
-        let leaves = self.chunks.par_iter().zip(self.forest.leaves()).zip(&mut self.near).enumerate();
+        self.particle_forces.near.resize_with(self.chunks.len(), Vec::new);
+        let leaves =
+            self.chunks.par_iter().zip(self.forest.leaves()).zip(&mut self.particle_forces.near).enumerate();
         self.phases.time(Phase::Nodes, || {
             let found = leaves.with_min_len(16).map(|(leaf, ((chunk, octant), near))| {
                 if field == 0 {

@@ -98,7 +98,7 @@ impl<'a, const D: usize> Guard<'a, D> {
 impl<const D: usize> Solver<D> {
     /// Not collective. Adds the impulses of particles on the colliders whose surface they reached.
     pub(in crate::solver) fn book_met(&self, sums: &mut [[ExactSum; SUMS]]) {
-        for near in self.near.iter().flatten().filter(|near| near.impulse != [0.0; D]) {
+        for near in self.particle_forces.near.iter().flatten().filter(|near| near.impulse != [0.0; D]) {
             let touch =
                 Touch { collider: near.collider as usize, position: near.place, impulse: near.impulse };
             touch.book(&self.physics.colliders, &self.contacts.states, sums);

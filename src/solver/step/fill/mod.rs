@@ -43,7 +43,7 @@ impl<const D: usize> Solver<D> {
     /// `time` (s) of the step. `shifts` has the sum of mass times shift of each own leaf, kg m.
     pub(super) fn book_shifts(&mut self, shifts: &[[f64; D]], time: f64) {
         let gravity = self.physics.gravity.at(time);
-        let Some([sum]) = self.shift_sums.of.first_mut() else { return };
+        let Some([sum]) = self.sums.shifts.of.first_mut() else { return };
         for shift in shifts.iter().filter(|shift| **shift != [0.0; D]) {
             shift.iter().zip(gravity).for_each(|(way, gravity)| sum.add(-way * gravity));
         }
@@ -51,7 +51,7 @@ impl<const D: usize> Solver<D> {
 
     /// Not collective. Adds work and heat of artificial viscosity in a step.
     pub(super) fn book_shocks(&mut self) {
-        let Some(sums) = self.shock_sums.of.first_mut() else { return };
+        let Some(sums) = self.sums.shocks.of.first_mut() else { return };
         for shock in self.leaf_data.shocks.iter().filter(|shock| **shock != [0.0; SHOCK_SUMS]) {
             sums.iter_mut().zip(shock).for_each(|(sum, work)| sum.add(*work));
         }
@@ -60,11 +60,11 @@ impl<const D: usize> Solver<D> {
     /// Collective. Work of artificial viscosity since the start and the part of it that is heat of the
     /// material, J, where there is any.
     pub fn shock_work(&self) -> Option<[f64; SHOCK_SUMS]> {
-        self.shock_sums.totals(&self.comm).first().copied()
+        self.sums.shocks.totals(&self.comm).first().copied()
     }
 
     /// Collective. Work of the shifts since the start, J, where there are fluids.
     pub fn shift_work(&self) -> Option<f64> {
-        self.shift_sums.totals(&self.comm).first().map(|[work]| *work)
+        self.sums.shifts.totals(&self.comm).first().map(|[work]| *work)
     }
 }

@@ -108,7 +108,7 @@ impl<'a, const D: usize> Barrier<'a, D> {
 impl<const D: usize> Solver<D> {
     /// Not collective. Adds what particles gave to the faces that they met.
     pub(in crate::solver) fn book_struck(&mut self) {
-        let sums = &mut self.face_sums.of;
+        let sums = &mut self.sums.faces.of;
         for Struck { face, impulse } in self.leaf_data.struck.iter().flatten() {
             let sums = sums.get_mut(*face).into_iter().flatten();
             sums.zip(impulse).for_each(|(sum, value)| sum.add(*value));
