@@ -1,9 +1,11 @@
 //! Particles follow the size of the cells of their leaf.
 use super::merge_backoff::RetrySlot;
-use super::{Gap, Setting, drift, ids, needs_split, rings, split};
+use super::split::moments::spread;
+use super::split::{Gap, close_gaps, split};
+use super::{Setting, ids};
 use crate::adaptivity::Adaptivity;
-use crate::kernel::{Coordinates, Scheme, domain};
-use crate::particle::chunk::{Chunk, Layout, Tag};
+use crate::kernel::{BoxPolicy, Coordinates, Scheme, Select, domain};
+use crate::particle::chunk::{Chunk, Tag};
 
 /// Splits in one leaf.
 #[derive(Clone, Debug, Default)]
@@ -74,13 +76,10 @@ impl<'a, const D: usize> Resampling<'a, D> {
         let from = self.setting(from);
         loop {
             let energies = &mut done.energies;
-            let split = drift::close_gaps(
-                chunk,
-                &self.setting(level),
-                gap,
-                |chunk, p| spread(chunk, p, &from),
-                &mut |e| energies.push(e),
-            );
+            let split =
+                close_gaps(chunk, &self.setting(level), gap, |chunk, p| spread(chunk, p, &from), &mut |e| {
+                    energies.push(e)
+                });
             done.split += split;
             if split == 0 {
                 return;
@@ -130,56 +129,36 @@ impl<'a, const D: usize> Resampling<'a, D> {
     }
 }
 
-/// Second moments of the weights of a particle on the lattice of the cells of a leaf, m².
-fn spread<const D: usize>(chunk: &Chunk<D>, p: usize, leaf: &Setting<D>) -> [f64; D] {
-    let cell = leaf.cell();
-    if leaf.has_rings() {
-        return rings::spread(chunk, p, cell, leaf);
-    }
-    let half = chunk.column(Layout::<D>::HALF)[p];
-    chunk.position(p).map(|x| spread_on_lattice(x, half, cell))
+/// Particles that are too large for their leaf.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Wanted {
+    /// Those to split, ascending.
+    pub which: Vec<u32>,
+    /// Number of those that cannot be split, since their identifiers have no room for another generation.
+    pub refused: u64,
 }
 
-/// Second moment of the weights of a box on a lattice of nodes, along one axis: `l²/3 + mean of d (h - d)`,
-/// where d is the distance to the node below, m². The first part is that of the box, the second that of
-/// linear interpolation between two nodes.
-pub(super) fn spread_on_lattice(x: f64, half: f64, cell: f64) -> f64 {
-    let inside = |y: f64| y - cell * (y / cell).floor();
-    let box_part = half * half / 3.0;
-    if half < 1e-4 * cell {
-        let d = inside(x);
-        return f64::mul_add(d, cell - d, box_part).max(f64::MIN_POSITIVE);
-    }
-    // Integral of d (h - d) from 0, each whole cell h³/6.
-    let integral = |y: f64| {
-        let d = inside(y);
-        (y / cell).floor() * cell.powi(3) / 6.0 + d * d * (cell / 2.0 - d / 3.0)
-    };
-    box_part + ((integral(x + half) - integral(x - half)) / (2.0 * half)).max(0.0)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// Against the sums over nodes and points of a fine quadrature.
-    #[test]
-    fn spread_is_the_second_moment_of_the_weights() {
-        let cell = 0.2;
-        for (x, half) in [(0.53, 0.05), (0.6, 0.1), (0.47, 0.1), (0.71, 0.02), (0.65, 0.25), (0.55, 1e-7)] {
-            let (mut sum, points) = (0.0, 20_000);
-            for i in 0..points {
-                let y: f64 = x + half * (2.0 * (f64::from(i) + 0.5) / f64::from(points) - 1.0);
-                let below = (y / cell).floor();
-                let share = y / cell - below;
-                let squared = |node: f64| (node * cell - x) * (node * cell - x);
-                sum += (1.0 - share) * squared(below) + share * squared(below + 1.0);
+/// Particles that [`split()`] should treat: those made for a level coarser than that of the leaf, and, where
+/// boxes follow the stretch ([`BoxPolicy::Volume`]), those whose box is wider along some axis than `stretch`
+/// times that of an undeformed particle of the leaf's level. The latter are measured against the leaf and not
+/// against themselves, so that their children do not split again before they have stretched as much once
+/// more.
+pub fn needs_split<const D: usize>(chunk: &Chunk<D>, setting: &Setting<D>, stretch: Option<f64>) -> Wanted {
+    let stretch = stretch.filter(|_| matches!(setting.scheme.boxes, BoxPolicy::Volume { .. }));
+    let half = stretch.map(|limit| (limit, setting.territories(chunk, Select::All)));
+    let mut wanted = Wanted::default();
+    for (p, (&tag, &id)) in chunk.tags().iter().zip(chunk.ids()).enumerate() {
+        let tag = Tag::unpack(tag);
+        let too_wide = |(limit, half): &(f64, Vec<[f64; D]>)| {
+            let greatest = limit * setting.nominal(tag, setting.level);
+            half[p].iter().any(|&half| half > greatest)
+        };
+        if tag.level < setting.level || half.as_ref().is_some_and(too_wide) {
+            match ids::generation(id) < ids::GENERATIONS {
+                true => wanted.which.push(p as u32),
+                false => wanted.refused += 1,
             }
-            approx::assert_relative_eq!(
-                spread_on_lattice(x, half, cell),
-                sum / f64::from(points),
-                max_relative = 1e-6
-            );
         }
     }
+    wanted
 }

@@ -10,8 +10,7 @@
 //! A family that a face cuts in two is in two leaves, so neither can merge it. [`separated`] returns the
 //! particles that have to cross to the leaf on the lower side for a while. It cannot know which faces cut a
 //! family that is near several, so the caller tries the combinations of axes in turn.
-use super::merge::{Limits, of_level};
-use super::{Setting, ids, merge_backoff};
+use super::{Limits, Setting, ids, merge_backoff};
 use crate::csr::Csr;
 use crate::particle::chunk::{Chunk, Tag};
 
@@ -168,4 +167,10 @@ pub fn separated<const D: usize>(
     }
     separated.sort_unstable_by_key(|(p, _)| *p);
     separated
+}
+
+/// Index and packed tag, without count, of the particles made for a level.
+pub(super) fn of_level<const D: usize>(chunk: &Chunk<D>, level: u8) -> impl Iterator<Item = (u32, u64)> {
+    let tags = (0..).zip(chunk.tags().iter().copied().map(merge_backoff::plain));
+    tags.filter(move |(_, tag)| Tag::unpack(*tag).level == level)
 }

@@ -8,9 +8,10 @@
 //! along it, becomes two, half as wide along this axis alone. Its tag says so (see
 //! [`crate::particle::halvings`]): boxes of halves tile the box of the whole. Mass, momentum and angular
 //! momentum are kept as [`pair::part`] says.
-use super::cell_fit::spread_on_lattice;
 use super::mixture::{Group, mixtures};
-use super::{Limits, Merged, Setting, ids, merge_backoff, pair};
+use super::split::moments::spread_on_lattice;
+use super::split::pair;
+use super::{Limits, Merged, Setting, ids, merge_backoff};
 use crate::kernel::Scheme;
 use crate::material::eigen::decompose;
 use crate::particle::chunk::{Chunk, Layout, Tag};

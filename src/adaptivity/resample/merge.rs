@@ -1,38 +1,11 @@
 //! Several particles become one.
 use rustc_hash::{FxHashMap, FxHashSet};
 
-use super::family::{self, Bounds};
+use super::family::{self, Bounds, of_level};
 use super::mixture::{Group, mixtures};
-use super::{Setting, merge_backoff};
+use super::{Limits, Setting, merge_backoff};
 use crate::csr::Csr;
 use crate::particle::chunk::{Chunk, Layout, Tag};
-
-/// Limits on the differences of particles that become one.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Limits {
-    /// Greatest difference of a velocity from the affine field through the velocities of the group, as a
-    /// share of the wave speed of the undeformed material. The field is fitted to the centres as if these
-    /// were boxes, so that a quarter of the affine part may count as difference as well.
-    pub velocity: f64,
-    /// Greatest difference from the mean of the elastic Hencky strain (Frobenius norm).
-    pub strain: f64,
-    /// Greatest difference from the mean of the logarithm of the plastic volume ratio: a difference in the
-    /// distance of grains.
-    pub volume: f64,
-    /// Greatest difference of the first history variable (plastic strain) from the mean.
-    pub history: f64,
-    /// Greatest half width of the merged box, and of a box about the boxes of a family, over that of an
-    /// undeformed particle of the new level. Above 1, and below the stretch at which particles split, so that
-    /// a merge does not undo that. A box about those of strangers may be wider by half: they share a cell of
-    /// the lattice, out of which halves of boxes stand.
-    pub stretch: f64,
-}
-
-impl Default for Limits {
-    fn default() -> Self {
-        Self { velocity: 0.005, strain: 0.02, volume: 0.1, history: 0.2, stretch: 1.5 }
-    }
-}
 
 /// Results of [`merge`].
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -243,10 +216,4 @@ fn close<const D: usize>(
     }
     let smallest = members.iter().map(|&p| chunk.ids()[p as usize]).min();
     groups.extend(smallest.map(|id| Group::new(members, id, false)));
-}
-
-/// Index and packed tag, without count, of the particles made for a level.
-pub(super) fn of_level<const D: usize>(chunk: &Chunk<D>, level: u8) -> impl Iterator<Item = (u32, u64)> {
-    let tags = (0..).zip(chunk.tags().iter().copied().map(merge_backoff::plain));
-    tags.filter(move |(_, tag)| Tag::unpack(*tag).level == level)
 }

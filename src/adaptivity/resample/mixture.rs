@@ -1,7 +1,9 @@
 //! The particle that stands for a group.
 use rustc_hash::FxHashSet;
 
-use super::{Limits, Setting, ids, read_matrix, volume, write_matrix};
+use super::affine::{read_matrix, write_matrix};
+use super::setting::volume;
+use super::{Limits, Setting, ids};
 use crate::kernel::{Select, Transfer};
 use crate::material::{self, HISTORIES, PLASTIC_STRAIN, PLASTIC_VOLUME, State, Step, Symmetric, eigen};
 use crate::particle::chunk::{Chunk, Layout, Tag};

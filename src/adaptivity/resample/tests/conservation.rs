@@ -132,7 +132,7 @@ fn closing_gaps_conserves<const D: usize>(seed: u64) {
     let spread =
         |chunk: &Chunk<D>, p: usize| [chunk.column(Layout::<D>::HALF)[p].powi(2) + CELL * CELL / 6.0; D];
     let number = chunk.len();
-    while drift::close_gaps(&mut chunk, &setting, gap, spread, &mut |e| energy += e) > 0 {
+    while split::close_gaps(&mut chunk, &setting, gap, spread, &mut |e| energy += e) > 0 {
         passes += 1;
     }
     // Half a cell wide at rest, and three times as long.
@@ -149,7 +149,7 @@ fn closing_gaps_conserves<const D: usize>(seed: u64) {
     (1..=columns).for_each(|c| {
         chunk.carried_mut(c).iter_mut().for_each(|e| *e = if c <= D.min(2) { 99.0 } else { 0.0 })
     });
-    assert_eq!(drift::close_gaps(&mut chunk, &setting, gap, spread, &mut |_| ()), 0);
+    assert_eq!(split::close_gaps(&mut chunk, &setting, gap, spread, &mut |_| ()), 0);
 }
 
 proptest! {

@@ -1,8 +1,12 @@
 //! Tests of splitting and merging: common set-up and comparisons.
+use super::affine::{read_matrix, write_matrix};
+use super::cell_fit::{Wanted, needs_split};
 use super::family::{Bounds, separated};
+use super::setting::volume;
 use super::*;
-use crate::kernel::Transfer;
+use crate::kernel::{BoxPolicy, Scheme, Select, Transfer};
 use crate::material::{self, HISTORIES, Material, Parameters, State, Step};
+use crate::particle::chunk::{Chunk, Layout, Tag};
 use crate::simd::{Lanes, Vector};
 use proptest::prelude::*;
 

@@ -5,14 +5,14 @@
 //! affine matrix belong to the centre of mass, which is not the position, the centre of the section
 //! (`docs/design/axisymmetry.md`). So parts take the velocity of the affine field at their own centres of
 //! mass, and the mean of these is that of the whole.
-use super::cell_fit::spread_on_lattice;
-use super::split::{hand_share, make_child};
-use super::{Setting, gradient, ids, opposite, read_matrix, sides, write_matrix};
-use crate::kernel::{Transfer, domain};
+use super::child::{hand_share, make_child};
+use super::offsets::{opposite, sides};
+use crate::adaptivity::resample::affine::{gradient, read_matrix, write_matrix};
+use crate::adaptivity::resample::{Setting, ids};
+use crate::kernel::Transfer;
 use crate::particle::chunk::{Chunk, Layout};
 use crate::particle::halvings;
 use crate::particle::volume::volume_ratio;
-use crate::simd::Vector;
 
 /// Masses of the two parts of a ring of a mass at a radius (m) that are at an offset (m, of either sign)
 /// before and behind it. Their sum is the mass to the last bit.
@@ -111,43 +111,6 @@ pub(super) fn share_motion<const D: usize>(
     energy
 }
 
-/// Second moments, m², of the weights of a ring about its centre of mass, on a lattice of cells of this edge
-/// (m) that begins at the axis.
-pub(super) fn spread<const D: usize>(
-    chunk: &Chunk<D>,
-    p: usize,
-    cell: f64,
-    setting: &Setting<D>,
-) -> [f64; D] {
-    let half = domain::full_half_widths_of(chunk, &[p as u32], cell, &setting.extent, setting.scheme);
-    let (x, half) = (chunk.position(p), half.map(|half| half.to_array()[0]));
-    std::array::from_fn(|axis| match axis {
-        0 => along_radius(x[0], half[0], cell),
-        _ => spread_on_lattice(x[axis], half[axis], cell),
-    })
-}
-
-/// Second moment of the weights along the radius, about the centre of mass: that of the ring,
-/// `l²/3 - (l²/3r)²`, and the mean over it of `d (h - d)`, with d the distance to the node below, m².
-fn along_radius(radius: f64, half: f64, cell: f64) -> f64 {
-    let radius = radius.max(half);
-    let ahead = half * half / (3.0 * radius);
-    let of_ring = f64::mul_add(-ahead, ahead, half * half / 3.0);
-    let split = |y: f64| ((y / cell).floor(), y - cell * (y / cell).floor());
-    if half < 1e-4 * cell {
-        let d = split(radius).1;
-        return f64::mul_add(d, cell - d, of_ring).max(f64::MIN_POSITIVE);
-    }
-    // Integral of d (h - d) r from the axis: h⁴ n² / 12 up to the n-th node.
-    let integral = |y: f64| {
-        let (n, d) = split(y);
-        let (square, cube) = (d * d, d * d * d);
-        cell.powi(4) * n * n / 12.0 + n * cell * (0.5 * cell * square - cube / 3.0) + cell * cube / 3.0
-            - 0.25 * square * square
-    };
-    of_ring + ((integral(radius + half) - integral(radius - half)) / (2.0 * half * radius)).max(0.0)
-}
-
 /// Half width of the undeformed section of the space of a ring, m, whose stretch in the plane of the section
 /// is `e + 1` (see [`crate::particle::strain`]): of one that the stretch makes as large as the ring's section.
 pub(super) fn space<const D: usize>(chunk: &Chunk<D>, setting: &Setting<D>, p: usize, b: &[f64; 6]) -> f64 {
@@ -185,33 +148,4 @@ pub(super) fn halve<const D: usize>(
         chunk.tags_mut()[p] = halvings::otherwise_split(chunk.tags()[p], generation);
     }
     share_motion(chunk, setting, first, 2, spread)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// Against sums over nodes and points of a fine quadrature, at the axis too.
-    #[test]
-    fn spread_is_the_second_moment_of_the_weights_about_the_centre_of_mass() {
-        let cell = 0.2;
-        for (radius, half) in
-            [(0.53, 0.05), (0.1, 0.1), (0.05, 0.05), (0.47, 0.1), (7.65, 0.25), (0.55, 1e-7)]
-        {
-            let centre: f64 = radius + half * half / (3.0 * radius);
-            let (mut sum, points) = (0.0, 20_000);
-            for i in 0..points {
-                let y: f64 = radius + half * (2.0 * (f64::from(i) + 0.5) / f64::from(points) - 1.0);
-                let below = (y / cell).floor();
-                let share = y / cell - below;
-                let squared = |node: f64| (node * cell - centre) * (node * cell - centre);
-                sum += ((1.0 - share) * squared(below) + share * squared(below + 1.0)) * y / radius;
-            }
-            approx::assert_relative_eq!(
-                along_radius(radius, half, cell),
-                sum / f64::from(points),
-                max_relative = 1e-6
-            );
-        }
-    }
 }

@@ -1,8 +1,11 @@
 //! One particle becomes `2^D`.
-use super::{Setting, gradient, ids, opposite, read_matrix, rings, sides, write_matrix};
+use super::child::{hand_share, make_child};
+use super::offsets::{opposite, sides};
+use super::rings;
+use crate::adaptivity::resample::affine::{gradient, read_matrix, write_matrix};
+use crate::adaptivity::resample::{Setting, ids};
 use crate::kernel::{Select, Transfer};
-use crate::particle::chunk::{Chunk, Layout, Tag};
-use crate::particle::halvings;
+use crate::particle::chunk::{Chunk, Layout};
 
 /// Results of [`split`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -119,53 +122,4 @@ fn divide<const D: usize>(
         }
     }
     0.5 * mass * share * energy
-}
-
-/// Leaves a part of a particle its share of what the whole carried for loads.
-pub(super) fn hand_share<const D: usize>(chunk: &mut Chunk<D>, setting: &Setting<D>, p: usize, share: f64) {
-    let shares = chunk.carried_columns().min(setting.scheme.shares);
-    (0..shares).for_each(|column| chunk.carried_mut(column)[p] *= share);
-}
-
-/// Gives a copy of a particle the identifier and the level of its child of this number.
-pub(super) fn make_child<const D: usize>(chunk: &mut Chunk<D>, p: usize, child: usize) {
-    let parent = chunk.ids()[p];
-    chunk.ids_mut()[p] = ids::child::<D>(parent, child).unwrap_or(parent);
-    let packed = halvings::otherwise_split(chunk.tags()[p], ids::generation(parent));
-    let tag = Tag::unpack(packed);
-    chunk.tags_mut()[p] = halvings::with(packed, Tag { level: tag.level + 1, ..tag });
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use proptest::prelude::*;
-
-    proptest! {
-        #[test]
-        fn opposite_sides_are_exact(a in -1e3_f64..1e3, share in -1.0_f64..1.0) {
-            let b = share * a;
-            let (less, more) = opposite(a, b);
-            prop_assert_eq!(more - a, a - less);
-            prop_assert_eq!(0.5 * less + 0.5 * more, a);
-            prop_assert!((more - a - b).abs() <= f64::EPSILON * a.abs());
-        }
-
-        #[test]
-        fn sides_stay_in_the_domain(x in 0.0_f64..1.0, offset in 0.0_f64..2.0) {
-            let (lower, upper) = sides(x, offset, 1.0);
-            prop_assert!(lower >= 0.0 && upper < 1.0);
-            prop_assert_eq!(upper - x, x - lower);
-        }
-    }
-
-    #[test]
-    fn at_the_walls() {
-        assert_eq!(sides(0.0, 0.1, 1.0), (0.0, 0.0));
-        let last = 1.0 - f64::EPSILON / 2.0;
-        assert_eq!(sides(last, 0.1, 1.0), (last, last));
-        assert_eq!(opposite(0.0, 0.5), (-0.5, 0.5));
-        assert_eq!(opposite(0.0, -0.5), (0.5, -0.5));
-        assert_eq!(opposite(-1.0, 0.5), (-1.5, -0.5));
-    }
 }

@@ -1,12 +1,15 @@
 //! One particle becomes two.
-use super::{Setting, gradient, ids, opposite, read_matrix, rings, sides, write_matrix};
+use super::offsets::{opposite, sides};
+use super::rings;
+use crate::adaptivity::resample::affine::{gradient, read_matrix, write_matrix};
+use crate::adaptivity::resample::{Setting, ids};
 use crate::kernel::Transfer;
 use crate::particle::chunk::{Chunk, Layout};
 use crate::particle::halvings;
 
 /// Chunk with the particles listed (ascending) twice, one behind the other, and all others once; and where
 /// the first of each two are.
-pub(super) fn doubled<const D: usize>(
+pub(crate) fn doubled<const D: usize>(
     chunk: &Chunk<D>,
     which: impl Iterator<Item = u32>,
 ) -> (Chunk<D>, Vec<usize>) {
@@ -27,7 +30,7 @@ pub(super) fn doubled<const D: usize>(
 /// where a wall is near), with half its mass and volume each. `spread` is the second moment of the particle's
 /// weights in the grid that last gave it its affine matrix, m². Both take `B - C (o ⊗ o)` with the offset o,
 /// so that momentum is kept, and angular momentum to round-off. Returns the kinetic energy added, J.
-pub(super) fn part<const D: usize>(
+pub(crate) fn part<const D: usize>(
     chunk: &mut Chunk<D>,
     setting: &Setting<D>,
     first: usize,

@@ -7,7 +7,8 @@
 //! that axis. Mass and momentum are conserved as in [`super::split()`], and angular momentum since both take
 //! `B - C (o ⊗ o)` with the offset o. Particles whose space has grown in volume are left alone: separated
 //! grains (tension cut-off, spray) are no flow.
-use super::{Setting, ids, pair, rings};
+use super::{pair, rings};
+use crate::adaptivity::resample::{Setting, ids};
 use crate::material::tensor::eigen::{decompose, determinant};
 use crate::particle::chunk::{Chunk, Layout};
 use crate::particle::halvings::edge_of_whole;
@@ -61,7 +62,7 @@ fn half_width<const D: usize>(chunk: &Chunk<D>, setting: &Setting<D>, p: usize, 
 /// Replaces particles that have drifted apart by two each, in their place. `spread` is the second moment of a
 /// particle's weights in the grid that last gave it its affine matrix, m². `book` receives the kinetic energy
 /// that each split adds, J. Returns how many were replaced.
-pub(super) fn close_gaps<const D: usize>(
+pub(crate) fn close_gaps<const D: usize>(
     chunk: &mut Chunk<D>,
     setting: &Setting<D>,
     gap: Gap,
