@@ -2,7 +2,7 @@
 //!
 //! A file holds the parameters of a criterion as they stand in a job file, with ranges and units, its
 //! indicator, and its description. A line of the list below makes it a choice of the job file, with schema,
-//! checks and reference.
+//! checks and reference. `keys.rs` has what all of them ask of the job.
 //!
 //! | file | requests fine leaves |
 //! |---|---|
@@ -19,12 +19,11 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::Criterion;
-use crate::boundary::motion::Motion;
-use crate::geometry::{Shape, written};
 
 pub mod collider;
 pub mod free_surface;
 pub mod head_gradient;
+mod keys;
 pub mod material;
 pub mod plastic_strain;
 pub mod plastic_strain_rate;
@@ -32,31 +31,8 @@ pub mod region;
 pub mod stretch;
 pub mod velocity_gradient;
 
-/// The parameters of a criterion as they stand in a job file. Descriptions and ranges of the keys are those
-/// of the schema.
-pub(crate) trait Keys {
-    /// The criterion with these parameters, or faults of the job.
-    fn criterion<const D: usize>(&self, job: &mut dyn Job<D>) -> Option<Criterion<D>>;
-}
-
-/// The rest of the job, for criteria that refer to parts of it. `key` is the key of that criterion, for
-/// reports of faults.
-pub(crate) trait Job<const D: usize> {
-    /// A shape in coordinates relative to the domain's lower corner.
-    fn shape(&mut self, shape: &written::Shape, key: &'static str) -> Option<Shape<D>>;
-
-    /// The motion of a region by its rows.
-    fn motion(&mut self, rows: &[region::Way], key: &'static str) -> Option<Motion<D>>;
-
-    /// Index of the collider of that name.
-    fn collider(&mut self, name: &str, key: &'static str) -> Option<usize>;
-
-    /// Index of the material of that name.
-    fn material(&mut self, name: &str, key: &'static str) -> Option<usize>;
-
-    /// That water seeps in the job.
-    fn seepage(&mut self, key: &'static str) -> Option<()>;
-}
+pub use keys::Way;
+pub(crate) use keys::{Job, Keys};
 
 /// Makes the choice of criteria from a list of them.
 macro_rules! criteria {

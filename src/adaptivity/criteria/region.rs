@@ -2,12 +2,12 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::{Job, Keys};
+use super::{Job, Keys, Way};
 use crate::adaptivity::criterion::{Criterion, Indicator, Thresholds};
 use crate::adaptivity::leaf_view::{LeafView, Value};
 use crate::boundary::motion::Motion;
 use crate::geometry::Shape;
-use crate::geometry::written::{self, Vector};
+use crate::geometry::written;
 
 /// A region.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
@@ -29,17 +29,6 @@ pub struct Parameters {
     /// Its motion: linear between rows, at rest before the first and after the last.
     #[serde(default)]
     pub motion: Vec<Way>,
-}
-
-/// A row of the motion of a region.
-#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct Way {
-    /// Time, s.
-    #[schemars(range(min = -1e12, max = 1e12))]
-    pub time: f64,
-    /// Way from its place in the job, m.
-    pub translation: Vector,
 }
 
 impl Keys for Parameters {

@@ -1,6 +1,6 @@
 //! Dynamic refinement of the job file to that of the solver.
 use super::checks::{Checks, Space};
-use crate::adaptivity::criteria::region::Way;
+use crate::adaptivity::criteria::Way;
 use crate::adaptivity::criteria::{Job, Keys, Parameters};
 use crate::adaptivity::resample::Limits;
 use crate::adaptivity::{Adaptivity, Criterion, Thresholds};
