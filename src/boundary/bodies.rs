@@ -10,7 +10,7 @@
 
 use std::fmt;
 
-use super::motion::length;
+use super::vector::length;
 use crate::leapfrog::Lengths;
 use crate::text::{number, quantity};
 

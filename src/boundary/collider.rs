@@ -5,9 +5,10 @@
 //! distance as normal. The momentum that this takes from the material is what the material gives to the
 //! collider: its force and torque.
 use super::Contact;
-use super::motion::{Free, Motion, Pose, Rate, Table, length};
+use super::motion::{Free, Motion, Pose, Rate, Table};
 use super::rigid::Meeting;
 use super::rigid::turning::{self, Orientation};
+use super::vector::{cross, length};
 use crate::geometry::mesh::Deforming;
 use crate::geometry::vector::in_space;
 use crate::geometry::{Aabb, Shape};
@@ -317,14 +318,6 @@ impl<const D: usize> std::fmt::Display for Collider<D> {
             }
         }
     }
-}
-
-/// Cross product.
-pub fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    std::array::from_fn(|k| {
-        let (i, j) = ((k + 1) % 3, (k + 2) % 3);
-        a[i].mul_add(b[j], -(a[j] * b[i]))
-    })
 }
 
 #[cfg(test)]

@@ -2,7 +2,7 @@
 use std::fmt;
 
 use super::gap::Bounds;
-use super::motion::length;
+use super::vector::length;
 use crate::text::{number, quantity};
 
 /// Standard acceleration of gravity g (ISO 80000-3), m/s²: Voellmy's `ξ` is given for the Earth.
@@ -43,6 +43,15 @@ impl Default for Contact {
 }
 
 impl Contact {
+    /// What a surface under this law asks of material for which the gap asks this: surfaces that separate
+    /// hold nothing.
+    pub fn bounds(self, of_gap: Bounds) -> Bounds {
+        match self {
+            Self::Separating { .. } => Bounds { most: f64::INFINITY, ..of_gap },
+            _ => of_gap,
+        }
+    }
+
     /// Applies the condition to a velocity relative to the surface (m/s) of material that touches it. The
     /// unit normal points to the material.
     pub fn apply<const D: usize>(self, velocity: &mut [f64; D], normal: &[f64; D]) {
@@ -57,7 +66,7 @@ impl Contact {
     /// `|Δv_t| ≤ μ |Δv_n|` (Coulomb's law for the impulse of one step), and what cohesion and drag allow.
     /// Drag is taken at the end of the step, so that it never turns the velocity round.
     pub fn apply_within<const D: usize>(self, bounds: Bounds, velocity: &mut [f64; D], normal: &[f64; D]) {
-        let Bounds { least, most, sticking, drag } = bounds.under(self);
+        let Bounds { least, most, sticking, drag } = self.bounds(bounds);
         let outward = (0..D).fold(0.0, |sum, a| velocity[a].mul_add(normal[a], sum));
         let tangential: [f64; D] = std::array::from_fn(|a| (-outward).mul_add(normal[a], velocity[a]));
         let with_normal = |along: [f64; D], outward: f64| -> [f64; D] {

@@ -8,8 +8,6 @@
 //! where the share of the volume is not. A condition on the velocity of a node is then one that the surface
 //! of the material obeys: without the gap, material would be stopped as soon as it enters the hat, up to a
 //! cell early, and the few particles in the hat would carry the force of all.
-use super::Contact;
-
 /// Width of a gap, in cells, up to which cohesion and drag act.
 pub const STICKS: f64 = 0.1;
 
@@ -70,19 +68,12 @@ impl Bounds {
         let least = if gap > CLOSED * cell { -gap / dt } else { 0.0 };
         Self { least, most: if gap <= HELD * cell { 0.0 } else { f64::INFINITY }, sticking: 0.0, drag: 0.0 }
     }
-
-    /// The same for a law: surfaces that separate hold nothing.
-    pub fn under(self, law: Contact) -> Self {
-        match law {
-            Contact::Separating { .. } => Self { most: f64::INFINITY, ..self },
-            _ => self,
-        }
-    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::boundary::Contact;
 
     /// Volume and slope of a layer from a height up (cells), in a hat of cells of 1 m that it covers to a
     /// share.
@@ -117,7 +108,7 @@ mod tests {
             Bounds::across(0.75, 1.0, 0.5),
             Bounds { least: -1.5, most: f64::INFINITY, ..Bounds::TOUCHING }
         );
-        let free = Bounds::TOUCHING.under(Contact::default());
+        let free = Contact::default().bounds(Bounds::TOUCHING);
         assert_eq!(free, Bounds { most: f64::INFINITY, ..Bounds::TOUCHING });
     }
 }

@@ -1,5 +1,14 @@
 //! Boundary conditions on the velocities of real nodes, contact at particles, and the treatment of particles
 //! that leave.
+//!
+//! | file or folder | what it holds |
+//! |---|---|
+//! | [`contact`], [`gap`] | conditions on the velocity at a surface; the gap between material and surface |
+//! | [`absorbing`] | faces that absorb waves |
+//! | [`collider`], [`motion`] | colliders, and their motion |
+//! | [`rigid`] | rotation and contact of free bodies |
+//! | [`touching`], [`bodies`] | contact at particles, and between bodies |
+//! | `vector` | products of vectors that are rounded once |
 pub mod absorbing;
 pub mod bodies;
 pub mod collider;
@@ -8,6 +17,7 @@ pub mod gap;
 pub mod motion;
 pub mod rigid;
 pub mod touching;
+pub(crate) mod vector;
 
 pub use absorbing::Absorbing;
 pub use bodies::BodyContacts;

@@ -1,6 +1,7 @@
 //! How colliders move: at rest, steadily, by a table, or freely under gravity and the forces on them.
 use super::rigid::Meeting;
 use super::rigid::turning::{Inertia, Orientation, matrix};
+use super::vector::length;
 use crate::geometry::rotation;
 use crate::quantity::smooth_step;
 
@@ -240,11 +241,6 @@ fn slope<const D: usize>(pair: &[Knot<D>]) -> Rate<D> {
     let span = pair[1].time - pair[0].time;
     let velocity = std::array::from_fn(|k| (pair[1].translation[k] - pair[0].translation[k]) / span);
     Rate::about_axis(velocity, (pair[1].angle - pair[0].angle) / span)
-}
-
-/// Euclidean length.
-pub(crate) fn length(vector: &[f64]) -> f64 {
-    vector.iter().fold(0.0, |sum: f64, c| c.mul_add(*c, sum)).sqrt()
 }
 
 #[cfg(test)]

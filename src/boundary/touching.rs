@@ -13,7 +13,8 @@
 use super::Contact;
 use super::collider::Collider;
 use super::gap::{Bounds, STICKS};
-use super::motion::{Pose, Rate, length};
+use super::motion::{Pose, Rate};
+use super::vector::length;
 use crate::leapfrog::Lengths;
 
 /// Gap, as a share of the distance at which a particle touches, up to which `sticky` and `slip` surfaces keep

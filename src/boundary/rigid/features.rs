@@ -1,10 +1,8 @@
 //! Points of a collider that may touch something, in its place in the job.
 use std::collections::BTreeMap;
 
-use super::{dot, in_plane};
 use crate::boundary::Collider;
-use crate::boundary::collider::cross;
-use crate::boundary::motion::length;
+use crate::boundary::vector::{cross, dot, in_plane, length};
 use crate::geometry::vector::in_space;
 use crate::geometry::{Frustum, Mesh, Shape};
 

@@ -1,8 +1,10 @@
 //! Contacts of rigid bodies: points of one against the signed distance of the other, and against the faces of
 //! the domain.
+use super::Surroundings;
 use super::features::{Feature, points_of_rim};
-use super::{Surroundings, dot, in_plane};
-use crate::boundary::motion::{Pose, Rate, length};
+use crate::boundary::motion::{Pose, Rate};
+use crate::boundary::vector::length;
+use crate::boundary::vector::{dot, in_plane};
 use crate::boundary::{Collider, Contact};
 use crate::geometry::vector::in_space;
 

@@ -6,6 +6,7 @@
 //! | `turning` | inertia, orientation, and the rotation of a body without torque |
 //! | `numbers` | the state of a free body as stored in checkpoints |
 //! | `features` | points of a body that may touch something |
+//! | `meeting` `surroundings` | law of collisions; what bodies may touch, and the impulses on it |
 //! | `find` | contacts of bodies in a step |
 //! | `impulses` | impulses at all of them |
 //! | this | a step of all free bodies |
@@ -14,45 +15,16 @@
 mod features;
 mod find;
 mod impulses;
+mod meeting;
 mod numbers;
+mod surroundings;
 pub mod turning;
 
 pub use features::Features;
+pub use meeting::Meeting;
+pub use surroundings::{Push, Surroundings};
 
 use super::motion::{Motion, Pose, Rate};
-use super::{Collider, ColliderState, Contact};
-
-/// Friction and restitution of a free body in collisions.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Meeting {
-    /// Coefficient of friction.
-    pub friction: f64,
-    /// Coefficient of restitution: speed after over speed before the collision.
-    pub restitution: f64,
-}
-
-/// Colliders and faces of the domain that bodies may touch in a step.
-pub struct Surroundings<'a, const D: usize> {
-    /// All colliders, in their order.
-    pub colliders: &'a [Collider<D>],
-    /// Their states at the start of the step.
-    pub states: &'a [ColliderState<D>],
-    /// Points of each collider that may touch something.
-    pub features: &'a [Features<D>],
-    /// Conditions on the lower and upper face of the domain along each axis.
-    pub faces: &'a [[Contact; 2]; D],
-    /// Upper corner of the domain, m.
-    pub extent: [f64; D],
-}
-
-/// Impulse (kg m/s) and angular impulse about the reference point (kg m²/s) on a collider in a step.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Push {
-    /// Impulse.
-    pub impulse: [f64; 3],
-    /// Angular impulse.
-    pub turn: [f64; 3],
-}
 
 impl<const D: usize> Surroundings<'_, D> {
     /// Changes the mean velocities of free bodies that touch something in a step of length `dt` (s). Returns
@@ -88,15 +60,6 @@ impl<const D: usize> Surroundings<'_, D> {
         }
         Pose::new(translation, half.mul_add(mean.spin, pose.angle), collider.axis)
     }
-}
-
-/// A vector of space as one of the job.
-pub(super) fn in_plane<const D: usize>(v: &[f64; 3]) -> [f64; D] {
-    std::array::from_fn(|a| v[a])
-}
-
-fn dot(a: &[f64; 3], b: &[f64; 3]) -> f64 {
-    (0..3).fold(0.0, |sum, k| a[k].mul_add(b[k], sum))
 }
 
 #[cfg(test)]

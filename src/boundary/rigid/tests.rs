@@ -1,8 +1,9 @@
 //! Bodies among faces and each other, against closed forms and conservation laws.
 use super::turning::Inertia;
 use super::{Features, Meeting, Push, Surroundings};
-use crate::boundary::collider::cross;
-use crate::boundary::motion::{Free, Motion, Rate, Table, length};
+use crate::boundary::motion::{Free, Motion, Rate, Table};
+use crate::boundary::vector::cross;
+use crate::boundary::vector::length;
 use crate::boundary::{ActsOn, Collider, ColliderState, Contact};
 use crate::geometry::{Aabb, Placement, Shape, rotation};
 

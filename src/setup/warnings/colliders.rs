@@ -1,6 +1,7 @@
 //! Colliders that are unlikely to act as intended.
 use super::NAME;
-use crate::boundary::motion::{Motion, Pose, length};
+use crate::boundary::motion::{Motion, Pose};
+use crate::boundary::vector::length;
 use crate::boundary::{ActsOn, Collider, Contact};
 use crate::geometry::{Aabb, Shape, Side, common_point};
 use crate::job::Problem;

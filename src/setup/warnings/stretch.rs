@@ -1,7 +1,7 @@
 //! Elastic bodies that a job stretches further than particles follow.
 use super::NAME;
 use crate::boundary::Contact;
-use crate::boundary::motion::length;
+use crate::boundary::vector::length;
 use crate::geometry::{Aabb, common_point};
 use crate::job::Problem;
 use crate::job::problem::{Body, BoxPolicy};

@@ -1,7 +1,7 @@
 //! Colliders in a step: their reactions and their motion.
-use crate::boundary::collider::cross;
 use crate::boundary::motion::Rate;
 use crate::boundary::rigid::{Push, Surroundings};
+use crate::boundary::vector::cross;
 use crate::boundary::{Collider, ColliderState};
 use crate::exact_sum::ExactSum;
 use crate::geometry::Aabb;

@@ -3,7 +3,8 @@ use std::cell::OnceCell;
 
 use super::super::checks::Checks;
 use super::{Z, allowed, optional, records};
-use crate::boundary::motion::{Free, Rate, Table, length};
+use crate::boundary::motion::{Free, Rate, Table};
+use crate::boundary::vector::length;
 use crate::boundary::rigid::{Meeting, turning};
 use crate::geometry::{Moments, Shape};
 use crate::job::parse::source::Path;

@@ -239,7 +239,7 @@ impl<const D: usize> Foot<D> {
             arm: [0.0; D],
             lever: [0.0; D],
             surface,
-            bounds: Bounds::across(gap, self.cell, lengths.drift).under(law),
+            bounds: law.bounds(Bounds::across(gap, self.cell, lengths.drift)),
             law,
             // Of an area of 1 m² and a density of 1 kg/m³, until these are known.
             sticking: law.cohesion() * over,
