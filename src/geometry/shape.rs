@@ -3,24 +3,7 @@ use super::primitives::{
     box_distance, frustum_distance, half_space_distance, polygon_distance, sphere_distance,
 };
 use super::vector::in_space;
-use super::{Aabb, Mesh};
-
-/// A truncated cone; a cylinder when both radii are equal, a cone when the upper one is 0.
-///
-/// In 2D it is the symmetric trapezium with these half widths.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Frustum<const D: usize> {
-    /// Centre of the lower end, m.
-    pub base: [f64; D],
-    /// Unit vector from the lower end to the upper one.
-    pub axis: [f64; D],
-    /// Distance between the ends, m.
-    pub height: f64,
-    /// Radius of the lower end, m.
-    pub lower_radius: f64,
-    /// Radius of the upper end, m.
-    pub upper_radius: f64,
-}
+use super::{Aabb, Frustum, Mesh};
 
 /// A rotation about a point, from the shape's own frame to space: `x = R (y - pivot) + pivot`.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -4,6 +4,7 @@
 //! |---|---|
 //! | `read` | OBJ, PLY and STL to triangles |
 //! | `stl` | STL |
+//! | `triangles` | the triangles of a file, or why it gives none |
 //! | `polygon` | faces with more corners to triangles |
 //! | `terrain/` | rasters of heights to triangles |
 //! | `solid` | checks that triangles bound a solid |
@@ -33,12 +34,14 @@ mod read;
 mod solid;
 mod stl;
 mod terrain;
+mod triangles;
 mod winding;
 
 pub use deforming::{Deforming, Mismatch};
-pub use read::{ReadError, Triangles, ply_columns, read};
+pub use read::{ply_columns, read};
 pub use solid::NotSolid;
 pub use terrain::{Placing, Raster as HeightRaster, Terrain};
+pub use triangles::{ReadError, Triangles};
 
 use solid::Merged;
 use winding::Winding;

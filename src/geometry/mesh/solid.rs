@@ -3,7 +3,8 @@ use std::collections::BTreeMap;
 
 use rustc_hash::{FxHashMap, FxHashSet};
 
-use super::{Aabb, Triangles};
+use super::Triangles;
+use crate::geometry::Aabb;
 use crate::geometry::vector::dot;
 use crate::text::{number, ordinal, quantity};
 

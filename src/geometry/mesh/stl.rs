@@ -3,7 +3,7 @@
 //! A file is binary if its length matches the number of triangles in its header, whatever the header begins
 //! with; else, if its first word is `solid`, it is text: words in letters of either case, one after another
 //! as many solids as there are.
-use super::read::{ReadError, Triangles};
+use super::triangles::{ReadError, Triangles};
 use crate::text::excerpt;
 
 /// Bytes ahead of the number of triangles of a binary file.

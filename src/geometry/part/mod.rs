@@ -17,6 +17,7 @@
 //! | `round` | what a ball, a cone or a cylinder leaves |
 //! | `solid` | what a box leaves of a mesh |
 use super::moments::Sums;
+use super::vector::product;
 use super::{Aabb, Frustum, Mesh, Moments, Shape, Side};
 use chain::Chain;
 use round::Round;
@@ -101,13 +102,13 @@ fn intersection<const D: usize>(
             Some(pieces)
         }
         Shape::HalfSpace { point, normal } => {
-            clip(&mut pieces, normal, dot(normal, point))?;
+            clip(&mut pieces, normal, product(normal, point))?;
             Some(pieces)
         }
         Shape::Sphere { centre, radius } => within(shape, pieces, place, Round::ball(*centre, *radius)),
         Shape::Frustum(frustum) => {
             let Frustum { base, axis, height, .. } = frustum;
-            let foot = dot(axis, base);
+            let foot = product(axis, base);
             clip(&mut pieces, axis, foot + height)?;
             clip(&mut pieces, &axis.map(|c| -c), -foot)?;
             if D == 2 {
@@ -159,10 +160,6 @@ fn intersection<const D: usize>(
     }
 }
 
-fn dot<const D: usize>(a: &[f64; D], b: &[f64; D]) -> f64 {
-    (0..D).map(|k| a[k] * b[k]).sum()
-}
-
 fn negative<const D: usize>(pieces: &[Piece<D>]) -> impl Iterator<Item = Piece<D>> {
     pieces.iter().map(|piece| Piece { sign: -piece.sign, ..piece.clone() })
 }
@@ -206,7 +203,7 @@ fn at_tangent<const D: usize>(
     place: &Place<D>,
 ) -> Option<Vec<Piece<D>>> {
     let normal = shape.gradient(&place.centre);
-    clip(&mut pieces, &normal, dot(&normal, &place.centre) - shape.distance(&place.centre))?;
+    clip(&mut pieces, &normal, product(&normal, &place.centre) - shape.distance(&place.centre))?;
     Some(pieces)
 }
 
@@ -220,7 +217,7 @@ fn slants<const D: usize>(frustum: &Frustum<D>) -> [([f64; D], f64); 2] {
             let across = if a == 0 { -axis[1 % D] } else { axis[0] };
             f64::mul_add(slope, axis[a], side * across)
         });
-        (normal, dot(&normal, base) + lower_radius)
+        (normal, product(&normal, base) + lower_radius)
     })
 }
 

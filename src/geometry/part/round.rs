@@ -12,7 +12,7 @@ use std::sync::OnceLock;
 use super::chain::Chain;
 use crate::geometry::Frustum;
 use crate::geometry::moments::Sums;
-use crate::geometry::vector::{cross, in_space};
+use crate::geometry::vector::{cross, in_space, product};
 
 /// Points of the Gauss-Legendre rule between two heights.
 const POINTS: usize = 16;
@@ -57,7 +57,7 @@ impl<const D: usize> Round<D> {
     pub(super) fn add_to(&self, sign: f64, chain: &Chain<D>, sums: &mut Sums<D>) {
         let own = |x: &[f64; D]| -> [f64; D] {
             let from: [f64; D] = std::array::from_fn(|a| x[a] - self.origin[a]);
-            std::array::from_fn(|k| super::dot(&self.axes[k], &from))
+            std::array::from_fn(|k| product(&self.axes[k], &from))
         };
         let facets: Vec<Vec<[f64; D]>> =
             chain.facets().iter().map(|facet| facet.iter().map(own).collect()).collect();

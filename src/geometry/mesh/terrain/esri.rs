@@ -1,6 +1,5 @@
 //! ESRI ASCII grids.
-use super::raster::checked_size;
-use super::{MOST, Placing, Raster};
+use super::raster::{MOST, Placing, Raster, checked_size};
 
 /// Reads a header of `ncols`, `nrows`, `xllcorner` or `xllcenter`, `yllcorner` or `yllcenter`, `cellsize` (or
 /// `dx` and `dy`) and `NODATA_value`, and rows of values from north to south.

@@ -5,8 +5,7 @@ use tiff::ColorType;
 use tiff::decoder::{Decoder, DecodingResult, Limits};
 use tiff::tags::Tag;
 
-use super::raster::checked_size;
-use super::{MOST, Placing, Raster};
+use super::raster::{MOST, Placing, Raster, checked_size};
 
 /// `GTModelTypeGeoKey`, and its value for degrees.
 const MODEL: [u16; 2] = [1024, 2];

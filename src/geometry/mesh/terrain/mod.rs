@@ -2,16 +2,19 @@
 //!
 //! | file | content |
 //! |---|---|
-//! | `raster` | values on a regular grid, from a file of any kind |
+//! | `raster` | values on a regular grid |
+//! | `read` | the same from a file of any kind |
 //! | `esri` `geotiff` `npy` | the kinds |
 //! | this | the surface and the solid below |
-use super::read::Triangles;
+use super::Triangles;
 
 mod esri;
 mod geotiff;
 mod npy;
 mod raster;
+mod read;
 
+use raster::MOST;
 pub use raster::{Placing, Raster};
 
 /// Heights on a regular grid.
@@ -26,9 +29,6 @@ pub struct Terrain {
     /// Place of the south-western height in the raster's own coordinates, m.
     corner: [f64; 2],
 }
-
-/// Most heights of a raster.
-const MOST: usize = 4_000_000;
 
 /// Pieces into which a smooth surface cuts each edge of a cell.
 const PIECES: usize = 4;

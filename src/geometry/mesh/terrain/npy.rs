@@ -3,8 +3,7 @@ use std::io::{Cursor, Read};
 
 use npyz::{DType, NpyFile, Order, TypeChar};
 
-use super::raster::checked_size;
-use super::{MOST, Placing, Raster};
+use super::raster::{MOST, Placing, Raster, checked_size};
 use crate::text::excerpt;
 
 /// Most bytes of a header; one of an array of numbers has 128.

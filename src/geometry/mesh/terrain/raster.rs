@@ -1,9 +1,4 @@
-//! Values on a regular grid, from a file whose ending gives its format.
-use std::path::Path;
-
-use super::super::read::{MOST_BYTES, ReadError};
-use super::{MOST, esri, geotiff, npy};
-use crate::input_file;
+//! Values on a regular grid.
 
 /// Values on a regular grid.
 #[derive(Clone, Debug, PartialEq)]
@@ -40,24 +35,10 @@ const HOLE: f64 = -32768.0;
 /// Value without data, for files that declare none.
 const NONE: f64 = -9999.0;
 
-impl Raster {
-    /// Reads a raster: ESRI ASCII grid (`.asc`), GeoTIFF (`.tif`), or array of NumPy (`.npy`, `.npz`).
-    ///
-    /// # Errors
-    /// The file cannot be read, is of another kind, or damaged.
-    pub fn read(path: &Path, placing: &Placing) -> Result<Self, ReadError> {
-        let ending =
-            path.extension().map(|ending| ending.to_string_lossy().to_lowercase()).unwrap_or_default();
-        let bytes = input_file::read(path, MOST_BYTES)?;
-        let (kind, raster) = match ending.as_str() {
-            "tif" | "tiff" => ("GeoTIFF", geotiff::parse(&bytes, placing)),
-            "npy" => ("NumPy", npy::parse(&bytes, placing)),
-            "npz" => ("NumPy", npy::parse_archive(&bytes, placing)),
-            _ => ("ESRI ASCII grid", esri::parse(&String::from_utf8_lossy(&bytes), placing)),
-        };
-        raster.map_err(|reason| ReadError::Damaged { kind, reason })
-    }
+/// Most heights of a raster.
+pub(super) const MOST: usize = 4_000_000;
 
+impl Raster {
     /// A raster of values whose first row is the northernmost; `none` marks places without a value.
     pub(super) fn from_north(
         values: &[f64],
