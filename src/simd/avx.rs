@@ -1,5 +1,7 @@
 //! Four doubles in an AVX register.
-use super::*;
+use std::ops::{Add, BitAnd, BitOr, Div, Mul, Neg, Not, Sub};
+
+use super::exponent::{EXPONENT_MAGIC, FRACTION_BITS, ONE_BITS, TWO_52_BITS};
 use core::arch::x86_64::*;
 
 /// Four doubles in one register.

@@ -1,7 +1,8 @@
 //! [`Wide`]: a [`Vector`] as one register of AVX-512.
 use std::ops::{Add, AddAssign, BitAnd, BitOr, Div, Mul, Neg, Not, Sub};
 
-use super::{EXPONENT_MAGIC, F64x4, FRACTION_BITS, LANES, ONE_BITS, TWO_52_BITS, Vector, VectorMask};
+use super::exponent::{EXPONENT_MAGIC, FRACTION_BITS, ONE_BITS, TWO_52_BITS};
+use super::{F64x4, LANES, Vector, VectorMask};
 use core::arch::x86_64::*;
 
 /// One number for each of [`LANES`] particles. Only [`super::widest`] names it, for kernels on processors

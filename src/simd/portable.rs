@@ -1,5 +1,7 @@
 //! Four doubles as an array: for targets without AVX2, and the reference in tests.
-use super::*;
+use std::ops::{Add, BitAnd, BitOr, Div, Mul, Neg, Not, Sub};
+
+use super::exponent::{EXPONENT_MAGIC, FRACTION_BITS, ONE_BITS, TWO_52_BITS};
 
 /// Four doubles.
 #[derive(Clone, Copy, Debug)]
