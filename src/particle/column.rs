@@ -3,7 +3,7 @@ use std::iter::{Flatten, StepBy, Take};
 use std::ops::{Index, IndexMut};
 use std::slice;
 
-use super::chunk::TILE;
+use super::layout::TILE;
 use crate::simd::{LANES, Lanes, Vector};
 
 const _: () = assert!(LANES == TILE, "a batch of a kernel is a tile");

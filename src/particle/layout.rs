@@ -1,6 +1,9 @@
 //! Columns of a particle: real values and a tag.
 use crate::material;
 
+/// Particles of a tile.
+pub const TILE: usize = 8;
+
 /// Column numbers of the real-valued components of a particle in `D` dimensions.
 ///
 /// In plane strain (`D == 2`) symmetric tensors keep their out-of-plane `zz` component, so they

@@ -21,7 +21,7 @@ use bytemuck::{Pod, Zeroable, cast_slice, cast_slice_mut};
 
 pub use self::place::{Place, Revision};
 pub use super::column::{Column, ColumnMut};
-pub use super::layout::{Layout, Tag};
+pub use super::layout::{Layout, TILE, Tag};
 use super::widest::Widest;
 use crate::memory::Block;
 
@@ -31,9 +31,6 @@ mod edit;
 mod place;
 #[cfg(test)]
 mod tests;
-
-/// Particles of a tile.
-pub const TILE: usize = 8;
 
 /// One component of the particles of a tile: a line of the cache.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
