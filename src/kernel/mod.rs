@@ -6,6 +6,7 @@
 use bytemuck::{Pod, Zeroable};
 
 use self::batch::Batch;
+pub use self::select::Select;
 use crate::material::{Material, Viscosity};
 use crate::particle::chunk::Tag;
 use crate::simd::{F64x4, LANES, Lanes, Vector};
@@ -20,6 +21,7 @@ mod gathered;
 pub mod hanging;
 pub mod leavers;
 pub mod p2g;
+mod select;
 pub mod spread;
 pub mod stencil;
 #[cfg(test)]
@@ -84,15 +86,6 @@ impl<const D: usize> Frame<D> {
             self.corner[axis] < self.cell || upper > self.extent[axis] - self.cell
         })
     }
-}
-
-/// Which particles of a chunk take part.
-#[derive(Clone, Copy, Debug)]
-pub enum Select<'a> {
-    /// All, in the order of the chunk.
-    All,
-    /// These, in any order; none twice where a kernel writes.
-    List(&'a [u32]),
 }
 
 /// Transfer of velocities between particles and nodes.
