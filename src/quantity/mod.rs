@@ -4,18 +4,24 @@
 //! |---|---|
 //! | `expression/` | expressions in x, y, z, t, X, Y, Z, with `libm` behind their functions |
 //! | `field/` | values at places from files: rasters, tables of points |
-//! | `record.rs` | tables over time from files of comma-separated values |
+//! | `record/` | tables over time from files of comma-separated values |
+//! | `place.rs` | places at which quantities are taken |
+//! | `smooth_step.rs` | a smooth rise |
 //! | `table.rs` | tables over time, linear between rows |
 //!
 //! Knows no particles and no jobs. Values are the same on every machine: `libm` computes all elementary
 //! functions.
 mod expression;
 pub mod field;
+mod place;
 pub mod record;
+mod smooth_step;
 mod table;
 
 pub use expression::{Expression, ExpressionError, NotFinite};
 pub use field::Field;
+pub use place::{Place, in_job};
+pub use smooth_step::smooth_step;
 pub use table::{Table, TableError};
 
 use std::sync::Arc;
@@ -24,39 +30,6 @@ use std::sync::Arc;
 pub const AXES: [&str; 3] = ["x", "y", "z"];
 /// Names of the faces of the domain, by axis and side.
 pub const FACES: [[&str; 2]; 3] = [["x_min", "x_max"], ["y_min", "y_max"], ["z_min", "z_max"]];
-
-/// From 0 at 0 to 1 at 1 on half a period of a cosine, `(1 - cos(π s)) / 2`; constant outside.
-pub fn smooth_step(s: f64) -> f64 {
-    if s <= 0.0 {
-        0.0
-    } else if s >= 1.0 {
-        1.0
-    } else {
-        0.5 * (1.0 - libm::cos(std::f64::consts::PI * s))
-    }
-}
-
-/// A place of material, m, in the coordinates of the job; z is 0 in plane strain.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Place {
-    /// The present place.
-    pub now: [f64; 3],
-    /// The place in the undeformed body: `now` less the displacement.
-    pub undeformed: [f64; 3],
-}
-
-impl From<[f64; 3]> for Place {
-    /// A place of material that has not moved, or of none.
-    fn from(now: [f64; 3]) -> Self {
-        Self { now, undeformed: now }
-    }
-}
-
-/// A point x (m from the lower corner of the domain, which lies at `origin`) in the coordinates of the job,
-/// the argument of quantities; z is 0 in plane strain.
-pub fn in_job<const D: usize>(origin: &[f64; D], x: &[f64; D]) -> [f64; 3] {
-    std::array::from_fn(|a| if a < D { origin[a] + x[a] } else { 0.0 })
-}
 
 /// A scalar that may depend on place and time.
 #[derive(Clone, Debug)]

@@ -1,7 +1,7 @@
 //! Records of the PEER ground motion database (`.AT2`, `.VT2`, `.DT2`): four lines of header, of which the
 //! last gives the number of values and their step, `NPTS= 7807, DT= .0050 SEC`, and then the values, several
 //! in a line.
-use super::{RecordError, Rows, number_of, quoted};
+use super::rows::{RecordError, Rows, number_of, quoted};
 
 /// Lines in which the step is searched.
 const HEADER: usize = 6;

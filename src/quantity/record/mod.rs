@@ -6,10 +6,14 @@
 use std::path::Path;
 
 mod peer;
+mod rows;
+
+pub(super) use rows::quoted;
+pub use rows::{RecordError, Rows, number_of};
 
 use super::{Table, TableError};
 use crate::input_file;
-use crate::text::{counted, excerpt};
+use crate::text::counted;
 
 /// Which column of a file.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -20,52 +24,11 @@ pub enum Column {
     Name(String),
 }
 
-/// Why a file gives no table.
-#[derive(Debug, thiserror::Error)]
-pub enum RecordError {
-    /// It cannot be read.
-    #[error("it cannot be read: {0}")]
-    System(#[from] std::io::Error),
-    /// A line is wrong.
-    #[error("line {line}: {reason}")]
-    Line {
-        /// The line, from 1.
-        line: u64,
-        /// Found and expected text, in words.
-        reason: String,
-    },
-    /// No rows.
-    #[error("it contains no row of numbers")]
-    Empty,
-    /// A record without columns.
-    #[error("it is a record of PEER: values at a constant step, without columns; remove `time` and `value`")]
-    Peer,
-    /// Points in space between which nothing can be found.
-    #[error(
-        "its points are no grid; expected all combinations of their x, y and z, or points over two of them"
-    )]
-    Scattered,
-    /// Points in a plane between which nothing can be found; in words.
-    #[error("{0}")]
-    Points(String),
-    /// The number of values is not that of the header.
-    #[error("it has {found} values; its header says NPTS = {expected}")]
-    Count {
-        /// Values that it has.
-        found: usize,
-        /// Values according to its header.
-        expected: usize,
-    },
-}
-
 /// Most bytes of a file.
 pub(super) const MOST_BYTES: u64 = 1 << 28;
 
 /// The mark of the order of bytes that some programs put first.
 const MARK: &[u8] = b"\xef\xbb\xbf";
-
-/// Longest piece of a file in a message.
-const QUOTED: usize = 40;
 
 /// The table of two columns of a file, times in s; values are multiplied by `scale`.
 ///
@@ -73,15 +36,6 @@ const QUOTED: usize = 40;
 /// The file cannot be read, lacks a column, or is no table.
 pub fn read(path: &Path, time: &Column, value: &Column, scale: f64) -> Result<Table, RecordError> {
     parse(&input_file::read(path, MOST_BYTES)?, time, value, scale)
-}
-
-/// Numbers of some columns of a file.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Rows {
-    /// Those of each row, in the order of the requested columns.
-    pub numbers: Vec<Vec<f64>>,
-    /// The line of each row, from 1.
-    pub lines: Vec<u64>,
 }
 
 /// The rows of these columns of a file; the first has the times, s, which increase.
@@ -239,15 +193,6 @@ fn parsed(cell: &[u8]) -> Option<f64> {
     number_of(std::str::from_utf8(cell).ok()?)
 }
 
-/// The number of a cell, also with the exponent of Fortran's double precision: `1.5D-03`.
-pub fn number_of(cell: &str) -> Option<f64> {
-    let fortran = || {
-        let is_number = cell.bytes().all(|byte| byte.is_ascii_digit() || b"+-.dD".contains(&byte));
-        cell.replace(['d', 'D'], "e").parse().ok().filter(|_| is_number)
-    };
-    cell.parse().ok().or_else(fortran)
-}
-
 fn number(record: &[Vec<u8>], at: usize, line: u64) -> Result<f64, RecordError> {
     let fault = |reason| RecordError::Line { line, reason };
     let cell = record.get(at).ok_or_else(|| {
@@ -256,10 +201,6 @@ fn number(record: &[Vec<u8>], at: usize, line: u64) -> Result<f64, RecordError> 
     })?;
     parsed(cell)
         .ok_or_else(|| fault(format!("found {} in column {}; expected a number", quoted(cell), at + 1)))
-}
-
-pub(super) fn quoted(cell: &[u8]) -> String {
-    format!("\"{}\"", excerpt(&String::from_utf8_lossy(cell), QUOTED))
 }
 
 #[cfg(test)]
