@@ -3,8 +3,7 @@
 //! At the start each particle at a surface gets the area that it stands for, and each particle of a point
 //! force its share. These numbers move with the particles, are shared among children and add up in merges, so
 //! that the total force is that of the definition at all times.
-use super::Load;
-use crate::quantity::{Place, Quantity};
+use crate::quantity::Quantity;
 
 /// A force that particles carry.
 #[derive(Clone, Debug)]
@@ -139,23 +138,6 @@ impl<const D: usize> Carried<D> {
     }
 }
 
-impl<const D: usize> Load<D> {
-    /// Force (N) on a particle at a place that carries these numbers in the columns of `carried`, which
-    /// belongs to this load, at a time of the load, s.
-    pub fn force(&self, carried: &Carried<D>, numbers: &[f64], place: &Place, time: f64) -> [f64; D] {
-        let place = *place;
-        match &carried.force {
-            CarriedForce::Traction(per_number) | CarriedForce::Point { force: per_number, .. } => {
-                per_number.each_ref().map(|component| component.at(place, time) * numbers[0])
-            }
-            CarriedForce::Pressure { pressure, .. } => {
-                let pressure = pressure.at(place, time);
-                std::array::from_fn(|axis| -pressure * numbers[axis])
-            }
-        }
-    }
-}
-
 /// `J F⁻ᵀ` of a deformation gradient F, which maps undeformed area vectors to deformed ones (Nanson's
 /// formula). In plane strain the thickness stays.
 pub fn cofactor<const D: usize>(f: &[[f64; D]; D]) -> [[f64; D]; D] {
@@ -179,6 +161,7 @@ fn length<const D: usize>(vector: &[f64; D]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::load::Load;
 
     /// Nanson: the cofactor turns the cross product of two edges into that of the deformed edges.
     #[test]

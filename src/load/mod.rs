@@ -7,60 +7,24 @@
 //!
 //! | file | what it holds |
 //! |---|---|
-//! | `mod.rs` | gravity, loads, and their effect on nodes |
+//! | `mod.rs` | loads, and their effect on nodes |
+//! | `gravity.rs` | gravity, and which way is up |
 //! | `carried.rs` | forces that particles carry: tractions, pressures, point forces |
 //! | `water.rs` | pressure of the water in the pores |
 //! | `seepage.rs` | heads between which water flows |
 mod carried;
+mod gravity;
 pub mod seepage;
 pub mod water;
 
 pub use carried::{Carried, CarriedForce, cofactor};
+pub use gravity::{Gravity, Up};
 pub use seepage::Seepage;
 pub use water::Water;
 
 use crate::geometry::Shape;
 use crate::leapfrog::Lengths;
 use crate::quantity::{Place, Quantity, in_job};
-
-/// Acceleration of gravity, which may change in time.
-#[derive(Clone, Debug)]
-pub struct Gravity<const D: usize> {
-    /// Components, m/s².
-    pub acceleration: [Quantity; D],
-    /// Time from which the time of the components is counted, s.
-    pub start: f64,
-}
-
-impl<const D: usize> Gravity<D> {
-    /// The same at all times, m/s².
-    pub fn constant(acceleration: [f64; D]) -> Self {
-        Self { acceleration: acceleration.map(Quantity::Constant), start: 0.0 }
-    }
-
-    /// Acceleration at a time (s), m/s².
-    pub fn at(&self, time: f64) -> [f64; D] {
-        std::array::from_fn(|axis| self.acceleration[axis].at([0.0; 3], time - self.start))
-    }
-}
-
-/// Which way is up.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Up {
-    /// The vertical axis.
-    pub axis: usize,
-    /// 1 along the axis, -1 against it.
-    pub sign: f64,
-}
-
-impl Up {
-    /// Against gravity, which lies along an axis.
-    pub fn new(gravity: &[f64]) -> Self {
-        let greatest = |&a: &usize, &b: &usize| gravity[a].abs().total_cmp(&gravity[b].abs());
-        let axis = (0..gravity.len()).max_by(greatest).unwrap_or(0);
-        Self { axis, sign: if gravity[axis] > 0.0 { -1.0 } else { 1.0 } }
-    }
-}
 
 /// Number of columns that particles carry for some loads.
 pub fn columns<const D: usize>(loads: &[Load<D>]) -> usize {
@@ -215,6 +179,21 @@ impl<const D: usize> Load<D> {
             Kind::Damping(rate) => {
                 let kept = libm::exp(-rate.at(place, of_forces) * kick);
                 velocity.iter_mut().for_each(|v| *v *= kept);
+            }
+        }
+    }
+
+    /// Force (N) on a particle at a place that carries these numbers in the columns of `carried`, which
+    /// belongs to this load, at a time of the load, s.
+    pub fn force(&self, carried: &Carried<D>, numbers: &[f64], place: &Place, time: f64) -> [f64; D] {
+        let place = *place;
+        match &carried.force {
+            CarriedForce::Traction(per_number) | CarriedForce::Point { force: per_number, .. } => {
+                per_number.each_ref().map(|component| component.at(place, time) * numbers[0])
+            }
+            CarriedForce::Pressure { pressure, .. } => {
+                let pressure = pressure.at(place, time);
+                std::array::from_fn(|axis| -pressure * numbers[axis])
             }
         }
     }
