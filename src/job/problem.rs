@@ -12,7 +12,7 @@ pub use crate::io::snapshot::PointField as Field;
 use crate::job::parse::error::Position;
 pub use crate::kernel::{BoxPolicy, Coordinates, Transfer};
 use crate::load::{Gravity, Load, Seepage, Water};
-use crate::material::initial::Consolidation;
+use crate::material::Consolidation;
 use crate::material::parameters::Parameters;
 use crate::material::undrained::{self, Undrained};
 use crate::material::{Failed, Material, Viscosity};

@@ -17,7 +17,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::hardening::Hardening;
-use super::laws::von_mises::{VonMises, Whole};
+use super::laws::metal::{VonMises, Whole};
 use super::parameters::OutOfRange;
 use super::tensor::eigen::determinant;
 use super::tensor::strain::Strain;

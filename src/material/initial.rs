@@ -5,25 +5,9 @@
 //! update, which yields where the stress lies outside the yield surface: so no law states its yield surface
 //! twice.
 use super::eigen::{Symmetric, decompose};
-use super::{HISTORIES, Material, PLASTIC_VOLUME, State, Step};
+use super::{Consolidation, HISTORIES, Material, PLASTIC_VOLUME, State, Step};
 use crate::simd::{Lanes, Vector};
 use crate::text::quantity;
-
-/// How strongly matter that yields under pressure was loaded once.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Consolidation {
-    /// Overconsolidation ratio: the preconsolidation pressure over that of the yield surface through the
-    /// stress; at least 1.
-    Ratio(f64),
-    /// The preconsolidation pressure, Pa.
-    Pressure(f64),
-}
-
-/// The pressure of a stress that is the same along all directions, Pa; `None` for any other stress.
-pub(super) fn even_pressure(stress: [f64; 3]) -> Option<f64> {
-    let pressure = -stress[0];
-    stress.iter().all(|s| (s + pressure).abs() <= 1e-12 * pressure.abs()).then_some(pressure)
-}
 
 /// State of a particle under stress.
 #[derive(Clone, Copy, Debug)]
@@ -222,35 +206,6 @@ fn principal(stress: &[f64; 6], plane: bool) -> ([f64; 3], [[f64; 3]; 3]) {
 fn compose(value: &[f64; 3], vector: &[[f64; 3]; 3]) -> [f64; 6] {
     [(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)]
         .map(|(i, j)| (0..3).map(|k| vector[k][i] * value[k] * vector[k][j]).sum())
-}
-
-/// Root of an increasing function of one number in `[low, high]`, to the last digits: the slope from the last
-/// two points, bisection where that leads outside or converges slowly. `None` where the function does not
-/// change its sign.
-pub(super) fn increasing_root(function: impl Fn(f64) -> f64, [mut low, mut high]: [f64; 2]) -> Option<f64> {
-    let (mut at_low, mut at_high) = (function(low), function(high));
-    if !(at_low <= 0.0 && at_high >= 0.0) {
-        return None;
-    }
-    for round in 0..200 {
-        let half = 0.5 * (low + high);
-        // Regula falsi with weights halved on the side that stays (Illinois), every fourth time a half.
-        let slope = low - at_low * (high - low) / (at_high - at_low);
-        let middle = if round % 4 < 3 && slope > low && slope < high { slope } else { half };
-        if middle <= low || middle >= high {
-            break;
-        }
-        let value = function(middle);
-        if value == 0.0 {
-            return Some(middle);
-        }
-        if value < 0.0 {
-            (low, at_low, at_high) = (middle, value, 0.5 * at_high);
-        } else {
-            (high, at_high, at_low) = (middle, value, 0.5 * at_low);
-        }
-    }
-    Some(0.5 * (low + high))
 }
 
 #[cfg(test)]

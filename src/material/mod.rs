@@ -5,7 +5,11 @@
 //!
 //! | file | content |
 //! |---|---|
-//! | `law.rs` | state, step, and the traits of a model |
+//! | `state.rs` | the state of a batch of particles, and the step |
+//! | `law.rs` | the trait of a model |
+//! | `advance.rs` `batches.rs` | all of an update; laws as the solver calls them |
+//! | `solid.rs` | the Hencky solid |
+//! | `consolidation.rs` | the stress that matter has borne |
 //! | `initial.rs` | states under a given stress |
 //! | `laws/` | the models, one file each, and the list of them |
 //! | `parameters/` | parameters that models share: elastic constants, checks, reading from text |
@@ -22,7 +26,10 @@
 //! | `driver/` | one particle along a path |
 use crate::simd::{LANES, Mask, VectorMask};
 
+mod advance;
 mod angle;
+mod batches;
+mod consolidation;
 mod coulomb;
 pub mod damage;
 pub mod driver;
@@ -34,16 +41,22 @@ pub mod laws;
 pub mod parameters;
 mod root;
 mod shock;
+mod solid;
+mod state;
 mod tangent;
 pub(crate) mod tensor;
 #[cfg(test)]
 mod tests;
 pub mod undrained;
 
-pub use law::{Law, Material, State, Step};
-pub use laws::{HISTORIES, Model};
+pub use batches::Material;
+pub use consolidation::Consolidation;
+pub use law::Law;
+pub use laws::Model;
 pub use parameters::Parameters;
 pub use shock::{SHOCK_SUMS, Shock, Viscosity};
+use state::OWN;
+pub use state::{HISTORIES, PLASTIC_STRAIN, PLASTIC_VOLUME, State, Step};
 pub use tangent::Tangent;
 pub use tensor::eigen::{self, Symmetric};
 
@@ -58,13 +71,6 @@ pub enum Failed {
     /// It becomes the material of this number.
     Becomes(u16),
 }
-
-/// The history variable that measures plastic strain.
-pub const PLASTIC_STRAIN: usize = 0;
-/// The history variable that is the logarithm of the plastic volume ratio; 0 for models without.
-pub const PLASTIC_VOLUME: usize = 1;
-/// The first history variable that is a model's own, such as its temperature.
-const OWN: usize = PLASTIC_VOLUME + 1;
 
 /// The model with these parameters and the density of the undeformed material, kg/m³.
 pub fn build(parameters: &Parameters, density: f64) -> Box<dyn Material> {

@@ -130,6 +130,35 @@ pub(super) fn bracketed<V: Vector>(
     x
 }
 
+/// Root of an increasing function of one number in `[low, high]`, to the last digits: the slope from the last
+/// two points, bisection where that leads outside or converges slowly. `None` where the function does not
+/// change its sign.
+pub(super) fn increasing_root(function: impl Fn(f64) -> f64, [mut low, mut high]: [f64; 2]) -> Option<f64> {
+    let (mut at_low, mut at_high) = (function(low), function(high));
+    if !(at_low <= 0.0 && at_high >= 0.0) {
+        return None;
+    }
+    for round in 0..200 {
+        let half = 0.5 * (low + high);
+        // Regula falsi with weights halved on the side that stays (Illinois), every fourth time a half.
+        let slope = low - at_low * (high - low) / (at_high - at_low);
+        let middle = if round % 4 < 3 && slope > low && slope < high { slope } else { half };
+        if middle <= low || middle >= high {
+            break;
+        }
+        let value = function(middle);
+        if value == 0.0 {
+            return Some(middle);
+        }
+        if value < 0.0 {
+            (low, at_low, at_high) = (middle, value, 0.5 * at_high);
+        } else {
+            (high, at_high, at_low) = (middle, value, 0.5 * at_low);
+        }
+    }
+    Some(0.5 * (low + high))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -8,9 +8,7 @@
 //! Its Kirchhoff value `J q` has the density of the undeformed material in place of ρ. Its power heats: each
 //! law says what becomes of that. The tangent `∂q/∂d = ρ h Q` with `Q = a_1 c + 2 a_2 h d` damps waves, which
 //! bounds the step as if they travelled at `Q + √(Q² + c²)`.
-use crate::simd::{LANES, Vector, VectorMask};
-
-use super::{Law, State, Step};
+use crate::simd::LANES;
 
 /// Numbers booked of it: work, and the part of it that is heat of the material.
 pub const SHOCK_SUMS: usize = 2;
@@ -40,29 +38,4 @@ pub struct Shock {
     pub viscosity: Viscosity,
     /// Rate of the volume, `tr D`, of each particle, 1/s.
     pub rate: [f64; LANES],
-}
-
-impl Shock {
-    /// Adds the artificial pressure to the stress after an update of a law, and its heat to the state.
-    #[inline(always)]
-    pub(super) fn press<V: Vector>(&self, law: &impl Law, state: &mut State<V>, step: &Step) {
-        let zero = V::splat(0.0);
-        let closing = -V::load(&self.rate);
-        let is_closing = zero.lt(closing);
-        if !is_closing.any() {
-            return;
-        }
-        let Viscosity { linear, quadratic } = self.viscosity;
-        let jump = closing.max(zero) * step.cell;
-        let pressure = jump * (jump * quadratic + state.wave_speed * linear) * law.density();
-        let work = pressure * closing.max(zero) * step.dt;
-        state.shock = [work, law.take_heat(state, work)];
-        for normal in &mut state.stress[..3] {
-            *normal = *normal - pressure;
-        }
-        let wave = state.wave_speed;
-        let damping = wave.mul_add(V::splat(linear), jump * (2.0 * quadratic));
-        let bound = damping + damping.mul_add(damping, wave * wave).sqrt();
-        state.wave_speed = is_closing.select(bound, wave);
-    }
 }

@@ -13,7 +13,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::initial::Consolidation;
+use super::consolidation::Consolidation;
 use super::laws::Model;
 use super::laws::drucker_prager::DruckerPrager;
 use super::laws::mohr_coulomb::MohrCoulomb;

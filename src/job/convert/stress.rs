@@ -7,7 +7,7 @@ use crate::job::schema::job_file::{JobFile, Material};
 use crate::job::schema::loads::Quantity as Written;
 use crate::job::schema::stress::{Stress, StressKind as WrittenKind};
 use crate::material;
-use crate::material::initial::Consolidation;
+use crate::material::Consolidation;
 use crate::quantity::Quantity;
 use crate::text::written as number;
 

@@ -12,7 +12,7 @@
 //! all of it.
 use super::softening::Curve;
 use super::{Damage, Softening};
-use crate::material::laws::hencky::Hencky;
+use crate::material::solid::Hencky;
 use crate::material::tensor::principal::{Lone, Principal};
 use crate::material::tensor::strain::Strain;
 use crate::material::{HISTORIES, Law, OWN, State, Step};

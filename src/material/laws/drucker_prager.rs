@@ -13,13 +13,13 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::Model;
-use super::hencky::Hencky;
-use super::von_mises::Overstress;
+use super::metal::Overstress;
 use crate::material::hardening::{Curve, Flow, Hardening};
 use crate::material::parameters::{Lame, OutOfRange};
 use crate::material::root::Function;
+use crate::material::solid::Hencky;
 use crate::material::tensor::strain::Strain;
-use crate::material::{self, HISTORIES, Law, OWN, PLASTIC_STRAIN, PLASTIC_VOLUME, State, Step, angle, root};
+use crate::material::{HISTORIES, Law, OWN, PLASTIC_STRAIN, PLASTIC_VOLUME, State, Step, angle, root};
 use crate::simd::{Vector, VectorMask};
 
 /// The cone through the Mohr-Coulomb pyramid on which a friction angle is matched.
@@ -161,7 +161,7 @@ impl Model for DruckerPrager {
         Self { dry, cohesive: Cohesive::new(p, lame, density) }
     }
 
-    fn boxed(p: &Parameters, density: f64) -> Box<dyn material::Material> {
+    fn boxed(p: &Parameters, density: f64) -> Box<dyn crate::material::Material> {
         let whole = Self::new(p, density);
         if whole.cohesive.is_none() { Box::new(whole.dry) } else { Box::new(whole) }
     }

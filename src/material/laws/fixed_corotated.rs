@@ -1,9 +1,10 @@
 //! Fixed corotated elasticity: `W = μ Σ (s - 1)² + λ/2 (J - 1)²` with principal stretches s,
 //! `τ = 2μ (V² - V) + λ (J - 1) J I` (Stomakhin et al. 2012).
 use super::Model;
+use crate::material::Consolidation;
 use crate::material::eigen::{decompose, greatest_bound};
-use crate::material::initial::{Consolidation, increasing_root};
 use crate::material::parameters::{Elastic, Lame};
+use crate::material::root::increasing_root;
 use crate::material::{HISTORIES, Law, State, Step};
 use crate::simd::{Vector, each};
 

@@ -5,12 +5,12 @@ use serde::{Deserialize, Serialize};
 
 use super::Model;
 use crate::material::damage::{Brittle, Damage};
-use crate::material::eigen::greatest_bound;
-use crate::material::initial::{Consolidation, increasing_root};
 use crate::material::parameters::Lame;
+use crate::material::root::increasing_root;
+use crate::material::solid::Hencky;
 use crate::material::tensor::strain::Strain;
-use crate::material::{self, HISTORIES, Law, State, Step, Symmetric};
-use crate::simd::{Vector, each};
+use crate::material::{Consolidation, HISTORIES, Law, State, Step};
+use crate::simd::Vector;
 
 /// Hencky elasticity, with or without damage.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -27,15 +27,6 @@ pub struct Parameters {
     pub damage: Option<Damage>,
 }
 
-/// Hencky solid.
-#[derive(Clone, Copy, Debug)]
-pub struct Hencky {
-    lame: Lame,
-    density: f64,
-    /// One over the density, m³/kg.
-    per_density: f64,
-}
-
 impl Model for Hencky {
     type Parameters = Parameters;
 
@@ -43,7 +34,7 @@ impl Model for Hencky {
         Self::of(p.young, p.poisson, density)
     }
 
-    fn boxed(p: &Parameters, density: f64) -> Box<dyn material::Material> {
+    fn boxed(p: &Parameters, density: f64) -> Box<dyn crate::material::Material> {
         let solid = Self::new(p, density);
         match &p.damage {
             Some(damage) => Box::new(Brittle::new(solid, p.young, damage)),
@@ -59,47 +50,6 @@ impl Model for Hencky {
             "model = 'hencky', young = 1e6, poisson = 0.3, damage = {kind = 'strain', onset = 0.02, \
              fracture_energy = 1e3, softening = 'exponential_crack_opening', tension_only = false}",
         ]
-    }
-}
-
-impl Hencky {
-    /// The elastic part of a plastic model: Young's modulus, Pa, Poisson's ratio and density, kg/m³.
-    pub(super) fn of(young: f64, poisson: f64, density: f64) -> Self {
-        Self { lame: Lame::new(young, poisson), density, per_density: 1.0 / density }
-    }
-
-    /// Shear modulus, Pa.
-    pub(in crate::material) fn shear_modulus(&self) -> f64 {
-        self.lame.mu
-    }
-
-    /// Bulk modulus, Pa.
-    pub(in crate::material) fn bulk_modulus(&self) -> f64 {
-        self.lame.lambda + 2.0 / 3.0 * self.lame.mu
-    }
-
-    /// Writes Kirchhoff stress and wave speed of a strain with this trace and this deviator.
-    #[inline(always)]
-    pub(in crate::material) fn load<V: Vector>(
-        &self,
-        state: &mut State<V>,
-        trace: V,
-        deviator: &Symmetric<V>,
-    ) {
-        let pressure = trace * (self.lame.lambda + 2.0 / 3.0 * self.lame.mu);
-        state.stress = each(*deviator, |component| component * (2.0 * self.lame.mu));
-        for normal in &mut state.stress[..3] {
-            *normal += pressure;
-        }
-        state.wave_speed = self.wave_speed_under(&state.stress);
-    }
-
-    /// Bound of the wave speeds: along a principal direction `ρ₀ c² = s² ∂P/∂F = λ + 2μ - τ`, greatest
-    /// where the stress is most compressive.
-    #[inline(always)]
-    fn wave_speed_under<V: Vector>(&self, stress: &Symmetric<V>) -> V {
-        let compression = greatest_bound(&each(*stress, |s| -s)).max(V::splat(0.0));
-        ((compression + V::splat(self.lame.pressure_wave())) * self.per_density).sqrt()
     }
 }
 

@@ -9,62 +9,33 @@
 //! | `neo_hookean.rs` | compressible neo-Hookean elasticity |
 //! | `fixed_corotated.rs` | fixed corotated elasticity |
 //! | `hencky.rs` | Hencky elasticity; elastic part of the plastic models |
-//! | `von_mises.rs` | metal: von Mises yield, isotropic hardening |
+//! | `von_mises.rs` `metal.rs` | metal: von Mises yield, isotropic hardening; its law |
 //! | `tresca.rs` | metal, undrained clay: Tresca yield |
 //! | `drucker_prager.rs` | sand: Drucker-Prager yield |
 //! | `mohr_coulomb.rs` | soil, rock: Mohr-Coulomb yield |
 //! | `cap/` | clay, snow and other matter that yields under pressure alone |
 //! | `flow/` | fluid, gas, high explosive, dense granular flow |
 use schemars::JsonSchema;
-use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
+use std::sync::LazyLock;
 
-use super::law::{Law, Material};
 use super::parameters::{OutOfRange, ranges};
+use super::solid::Hencky;
+use super::{Law, Material};
 
 pub mod cap;
 pub mod drucker_prager;
 pub mod fixed_corotated;
 pub mod flow;
 pub mod hencky;
+pub(in crate::material) mod metal;
+mod model;
 pub mod mohr_coulomb;
 pub mod neo_hookean;
 pub mod tresca;
 pub mod von_mises;
 
-/// A constitutive model with the form of its parameters.
-pub trait Model: Law {
-    /// Parameters as they stand in a job file. Descriptions and ranges of the keys are those of the schema.
-    type Parameters: Clone + std::fmt::Debug + PartialEq + Serialize + DeserializeOwned + JsonSchema;
-
-    /// The model with these parameters and the density of the undeformed material, kg/m³.
-    fn new(parameters: &Self::Parameters, density: f64) -> Self;
-
-    /// The same, as the solver calls it: a model may choose a law with less history for parameters that need
-    /// no more.
-    fn boxed(parameters: &Self::Parameters, density: f64) -> Box<dyn Material>
-    where
-        Self: Sized + 'static,
-    {
-        Box::new(Self::new(parameters, density))
-    }
-
-    /// Checks conditions beyond the ranges of single keys.
-    fn check(_parameters: &Self::Parameters) -> Result<(), OutOfRange> {
-        Ok(())
-    }
-
-    /// The parameters with the strength over `factor`, for factors of safety: cohesion, yield stress and the
-    /// tangents of the angles of friction; dilation at most that of the new friction. `None` for models
-    /// without strength.
-    fn weakened(_parameters: &Self::Parameters, _factor: f64) -> Option<Self::Parameters> {
-        None
-    }
-
-    /// Sets of parameters, in the form of a job file, that together cover every branch of the law: for tests
-    /// and benches. Strengths are such that some percent of strain makes it flow; densities are 1000 kg/m³.
-    fn examples() -> &'static [&'static str];
-}
+pub use model::Model;
 
 /// Makes the choice of models from a list of them.
 macro_rules! materials {
@@ -95,7 +66,10 @@ macro_rules! materials {
 
             /// Checks the ranges that the models need.
             pub fn check(&self) -> Result<(), OutOfRange> {
-                ranges::check(self)?;
+                // Made once: a job may have thousands of materials.
+                static SCHEMA: LazyLock<serde_json::Value> =
+                    LazyLock::new(|| schemars::schema_for!(Parameters).to_value());
+                ranges::check(&SCHEMA, self)?;
                 match self {
                     $(Self::$name(parameters) => <$law as Model>::check(parameters),)*
                 }
@@ -139,9 +113,9 @@ materials! {
     /// Fixed corotated elasticity: `τ = 2μ (V² - V) + λ (J - 1) J I`.
     FixedCorotated(fixed_corotated::FixedCorotated),
     /// Hencky elasticity: `τ = 2μ ln V + λ ln(J) I`.
-    Hencky(hencky::Hencky),
+    Hencky(Hencky),
     /// Von Mises plasticity.
-    VonMises(von_mises::VonMises),
+    VonMises(metal::VonMises),
     /// Tresca plasticity.
     Tresca(tresca::Tresca),
     /// Drucker-Prager plasticity.

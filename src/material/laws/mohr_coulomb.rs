@@ -12,15 +12,15 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::Model;
-use super::hencky::Hencky;
 use crate::material::angle::{self, Angle};
 use crate::material::coulomb::{Pyramid, Returned, Slopes};
 use crate::material::hardening::{Curve, Flow, Hardening};
 use crate::material::parameters::{Lame, OutOfRange};
 use crate::material::root::Function;
+use crate::material::solid::Hencky;
 use crate::material::tensor::principal::{Lone, Principal};
 use crate::material::tensor::strain::{Strain, finish};
-use crate::material::{self, HISTORIES, Law, OWN, PLASTIC_STRAIN, PLASTIC_VOLUME, State, Step, root};
+use crate::material::{HISTORIES, Law, OWN, PLASTIC_STRAIN, PLASTIC_VOLUME, State, Step, root};
 use crate::simd::{Lanes, Vector, VectorMask, each};
 
 /// How the material flows at yield.
@@ -127,7 +127,7 @@ impl Model for MohrCoulomb {
         Self(own.with_fixed_pyramid())
     }
 
-    fn boxed(p: &Parameters, density: f64) -> Box<dyn material::Material> {
+    fn boxed(p: &Parameters, density: f64) -> Box<dyn crate::material::Material> {
         Self::new(p, density).0.boxed()
     }
 
@@ -214,7 +214,7 @@ impl Properties {
     }
 
     /// The law as the solver calls it.
-    pub(super) fn boxed(self) -> Box<dyn material::Material> {
+    pub(super) fn boxed(self) -> Box<dyn crate::material::Material> {
         let whole = MohrCoulomb(self);
         match whole.0.fixed {
             Some(_) => Box::new(Only::<false>(whole)),

@@ -1,9 +1,10 @@
 //! Compressible neo-Hookean elasticity: `W = μ/2 (tr b - 3) - μ ln J + λ/2 ln² J`,
 //! `τ = μ (b - I) + λ ln J I` (Simo & Pister 1984).
 use super::Model;
+use crate::material::Consolidation;
 use crate::material::eigen::{determinant, greatest_bound};
-use crate::material::initial::{Consolidation, increasing_root};
 use crate::material::parameters::{Elastic, Lame};
+use crate::material::root::increasing_root;
 use crate::material::{HISTORIES, Law, State, Step};
 use crate::simd::Vector;
 use crate::simd::math::ln;

@@ -4,11 +4,11 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::Model;
-use super::hencky::Hencky;
 use super::mohr_coulomb::{MohrCoulomb, Properties};
 use crate::material::hardening::{Curve, Hardening};
 use crate::material::parameters::OutOfRange;
-use crate::material::{self, HISTORIES, Law, State, Step};
+use crate::material::solid::Hencky;
+use crate::material::{HISTORIES, Law, State, Step};
 use crate::simd::Vector;
 
 /// Hencky elasticity with Tresca yield.
@@ -41,7 +41,7 @@ impl Model for Tresca {
         Self(MohrCoulomb(Properties::of(p.young, p.poisson, density, cohesion)))
     }
 
-    fn boxed(p: &Parameters, density: f64) -> Box<dyn material::Material> {
+    fn boxed(p: &Parameters, density: f64) -> Box<dyn crate::material::Material> {
         let Self(MohrCoulomb(properties)) = Self::new(p, density);
         properties.boxed()
     }

@@ -1,19 +1,15 @@
 //! Ranges of parameters, as the schema of the job file states them.
-use std::sync::LazyLock;
-
 use schemars::JsonSchema;
 use serde::Serialize;
 use serde_json::Value;
 
-use super::{OutOfRange, Parameters};
+use super::OutOfRange;
 
-/// The first parameter that is outside the range that its type states.
-pub(crate) fn check(parameters: &Parameters) -> Result<(), OutOfRange> {
-    // Made once: a job may have thousands of materials.
-    static SCHEMA: LazyLock<Value> = LazyLock::new(|| schemars::schema_for!(Parameters).to_value());
+/// The first of these values that is outside the range that their schema states.
+pub(crate) fn check<T: Serialize>(schema: &Value, values: &T) -> Result<(), OutOfRange> {
     // JSON has no form for numbers that are not finite; they come as null.
-    let value = serde_json::to_value(parameters).unwrap_or_default();
-    Ranges { root: &SCHEMA }.look(&SCHEMA, &value, "")
+    let value = serde_json::to_value(values).unwrap_or_default();
+    Ranges { root: schema }.look(schema, &value, "")
 }
 
 /// The first key of a table that is outside the range that its type states; `name` is that of the table.

@@ -6,7 +6,7 @@
 use super::eigen::{Eigen, Symmetric, decompose};
 use super::near_unit::TraceFree;
 use crate::material::State;
-use crate::material::laws::hencky::Hencky;
+use crate::material::solid::Hencky;
 use crate::simd::math::{exp, ln};
 use crate::simd::{Lanes, Mask, Vector, VectorMask, each};
 

@@ -11,8 +11,8 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use crate::material::Consolidation;
 use crate::material::eigen::greatest_bound;
-use crate::material::initial::Consolidation;
 use crate::material::laws::Model;
 use crate::material::parameters::OutOfRange;
 use crate::material::tensor::strain::Strain;

@@ -8,10 +8,11 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use crate::material::Consolidation;
 use crate::material::eigen::{determinant, greatest_bound};
-use crate::material::initial::{Consolidation, increasing_root};
 use crate::material::laws::Model;
 use crate::material::parameters::Lame;
+use crate::material::root::increasing_root;
 use crate::material::{HISTORIES, Law, OWN, PLASTIC_STRAIN, PLASTIC_VOLUME, State, Step};
 use crate::simd::math::{exp, ln};
 use crate::simd::{Vector, VectorMask};

@@ -3,8 +3,8 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use crate::material::Consolidation;
 use crate::material::eigen::{decompose, greatest_bound};
-use crate::material::initial::Consolidation;
 use crate::material::laws::Model;
 use crate::material::laws::fixed_corotated::strain_of_stretches;
 use crate::material::parameters::Lame;

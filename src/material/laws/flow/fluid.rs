@@ -8,7 +8,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::forget_shear;
-use crate::material::initial::{Consolidation, even_pressure};
+use crate::material::consolidation::{Consolidation, even_pressure};
 use crate::material::laws::Model;
 use crate::material::tensor::strain::Strain;
 use crate::material::{HISTORIES, Law, PLASTIC_STRAIN, State, Step, eigen};

@@ -11,8 +11,8 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::material::laws::Model;
-use crate::material::laws::hencky::Hencky;
 use crate::material::parameters::{Lame, OutOfRange};
+use crate::material::solid::Hencky;
 use crate::material::tensor::strain::Strain;
 use crate::material::{Law, PLASTIC_STRAIN, PLASTIC_VOLUME, State, Step};
 use crate::simd::{Vector, VectorMask};
