@@ -1,7 +1,7 @@
 //! The constrained nodes of an arena by block, and the first moments that a bin has for them.
 use rustc_hash::FxHashMap;
 
-use super::{Block, NO_BLOCK, arena_index};
+use super::block::{Block, NO_BLOCK, arena_index};
 use crate::grid::constraints::moments::{self, Moments, first_row, rows_of};
 use crate::grid::mask::{arena_overlap, bits, offset, offset_count};
 use crate::kernel::constrained_nodes::{ConstrainedNodes, MomentNode};

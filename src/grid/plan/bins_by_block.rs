@@ -1,5 +1,5 @@
 //! Which own bins reach each block.
-use super::{Bin, NO_BLOCK};
+use super::block::{Bin, NO_BLOCK};
 use crate::csr::Csr;
 use crate::grid::mask::{offset_count, opposite};
 

@@ -3,60 +3,13 @@
 //! Most of these take the place of one arena in the fixed pattern: where the bins of a leaf or of another
 //! rank are the only ones within a subtree of the pattern, their contribution enters at one of its places,
 //! the others being empty. Contributions that do not fit are listed and added up along the tree of keys.
-use super::block_sum::{BlockSum, ZERO, ZEROS};
+use super::contributions::{BlockSum, Irregular, Other, Placed, ZERO, ZEROS};
 use crate::grid::constraints::moments::{self, Moments};
 use crate::grid::mask::{bits, offset_count, opposite};
 use crate::grid::order::region::{MOST_BINS, SPAN, arena_node};
 use crate::grid::order::{Origin, Term, arrange, fold};
-use crate::grid::plan::remote_sums::{NO_HOME, Part};
+use crate::grid::plan::pieces::{NO_HOME, Part};
 use crate::kernel::Row;
-
-/// A bin outside its leaf that reaches a block.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Other {
-    pub key: u64,
-    pub tie: u64,
-    /// Nodes of the block that it touches.
-    pub touched: u64,
-    /// Positions that its leaf covers or lies in.
-    pub homes: u32,
-    pub origin: Origin,
-}
-
-/// A sum that takes the place of an arena in the pattern of a region.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Placed {
-    /// The place.
-    pub slot: usize,
-    pub origin: Origin,
-}
-
-/// Sources of the sum of a block beside whole arenas. A thread reuses the memory from block to block.
-#[derive(Debug)]
-pub(super) struct Irregular<const D: usize> {
-    /// Bins outside their leaves.
-    pub outer: Vec<Other>,
-    /// Sums that take the place of arenas in the present region.
-    pub placed: Vec<Placed>,
-    /// Rows of other ranks in the present region, by place, at the distances that they have in an arena.
-    pub pieces: Vec<Row>,
-    terms: Vec<Term>,
-    rows: Vec<(u32, [Row; MOST_BINS])>,
-    moments: Vec<(u32, Moments<D>)>,
-}
-
-impl<const D: usize> Default for Irregular<D> {
-    fn default() -> Self {
-        Self {
-            outer: Vec::new(),
-            placed: Vec::new(),
-            pieces: vec![ZERO; MOST_BINS * SPAN],
-            terms: Vec::new(),
-            rows: Vec::new(),
-            moments: Vec::new(),
-        }
-    }
-}
 
 impl<const D: usize> BlockSum<'_, D> {
     /// Parts of received pieces that enter a region in this step, with the nodes that they touch.

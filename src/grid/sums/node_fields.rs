@@ -5,9 +5,8 @@
 //! ranks or threads. Blocks that no particle reaches are skipped: their rows are zero.
 use rayon::prelude::*;
 
-use super::block_sum::{BlockSum, Sources};
-use super::exchange::ReceivedSums;
-use super::irregular::Irregular;
+use super::contributions::{BlockSum, Irregular, Sources};
+use super::received::ReceivedSums;
 use crate::grid::arenas::Arenas;
 use crate::grid::arenas::arena_schedule::FIRST;
 use crate::grid::arenas::disjoint_slices::DisjointSlices;

@@ -7,7 +7,7 @@ use crate::grid::arenas::disjoint_slices::DisjointSlices;
 use crate::grid::constraints::moments::{self, Moments};
 use crate::grid::constraints::parent_table::{ParentNode, ParentTable, parity, weight_of};
 use crate::grid::mask::{bits, block_nodes, offset};
-use crate::grid::plan::block_links::{Child, FineBlock};
+use crate::grid::plan::links::{Child, FineBlock};
 use crate::grid::plan::{Block, GridPlan, NO_BLOCK};
 use crate::kernel::Row;
 use crate::simd::F64x4;

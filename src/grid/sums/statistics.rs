@@ -1,9 +1,8 @@
 //! Sizes of tree and grid on a rank, bytes that it sends, and the least bytes that other ranks need.
 use rustc_hash::FxHashMap;
 
-use super::block_sum::Sources;
+use super::contributions::{Irregular, Sources};
 use super::exchange::ArenaExchange;
-use super::irregular::Irregular;
 use crate::grid::arenas::Arenas;
 use crate::grid::plan::GridPlan;
 

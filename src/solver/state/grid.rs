@@ -5,7 +5,7 @@ use rayon::prelude::*;
 
 use crate::grid::arenas::{ArenaMut, Arenas, arena_schedule};
 use crate::grid::plan::ghost_layer::Allowance;
-use crate::grid::sums::exchange::ReceivedSums;
+use crate::grid::sums::received::ReceivedSums;
 use crate::grid::ties::{HALO, Ties};
 use crate::grid::{ArenaExchange, GridPlan, NodeFields, Seam};
 use crate::kernel::{Coordinates, Row, spread};
