@@ -17,7 +17,7 @@ use crate::particle::followed::Followed;
 use crate::particle::lanes::values;
 use crate::simd::{Lanes, Vector};
 use crate::solver::physics::{Physics, StepControl, Ties};
-use crate::solver::sorting::bins::{BinMissing, BoxWidths};
+use crate::solver::sorting::box_widths::{BinMissing, BoxWidths};
 use crate::solver::state::{Clock, Solver};
 use crate::solver::step::node_update::update_velocity;
 

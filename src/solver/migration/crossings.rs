@@ -2,6 +2,7 @@
 use partition::comm::Comm;
 
 use super::fluxes::Fluxes;
+use super::gone::Gone;
 use crate::boundary::{Contact, Leaving};
 use crate::exact_sum::ExactSum;
 use crate::quantity::FACES;
@@ -82,17 +83,6 @@ pub(super) fn farthest_beyond<const D: usize>(
 /// Name of a face of the domain in the job.
 pub(super) fn face_name((axis, side): (usize, usize)) -> &'static str {
     FACES[axis][side]
-}
-
-/// A particle that is no longer in the domain.
-#[derive(Clone, Copy, Debug)]
-pub(in crate::solver) struct Gone {
-    /// Its mass, kg.
-    pub mass: f64,
-    /// Its place, m from the lower corner of the domain; z is 0 in plane strain.
-    pub place: [f64; 3],
-    /// The face that it is farthest beyond: axis and side; `None` of one in the domain.
-    pub face: Option<(usize, usize)>,
 }
 
 /// Particles of one leaf that crossed a face of the domain in one step.

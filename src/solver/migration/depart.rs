@@ -2,8 +2,9 @@
 //!
 //! The last particles of a leaf fill the gaps of those that left. Particles that enter a finer leaf are split
 //! apart from the others: room for their children in the chunk would require a copy of the leaf.
-use super::crossings::{Crossed, Crossing, FaceRules, Gone, face_name, farthest_beyond};
-use super::migrate::MigrateError;
+use super::crossings::{Crossed, Crossing, FaceRules, face_name, farthest_beyond};
+use super::error::MigrateError;
+use super::gone::Gone;
 use super::records::{push_record, record_words};
 use crate::adaptivity::resample::cell_fit::{Resampling, Splits};
 use crate::grid::leaf_geometry::{leaf_box, position_key};

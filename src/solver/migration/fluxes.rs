@@ -2,7 +2,7 @@
 use partition::comm::Comm;
 use rayon::prelude::*;
 
-use super::crossings::Gone;
+use super::gone::Gone;
 use crate::exact_sum::ExactSum;
 use crate::particle::{Chunk, Layout};
 use crate::probe::{Flux, Section};

@@ -1,5 +1,5 @@
 //! Bounds on the widths of boxes, for sorting.
-use super::bins::BoxWidths;
+use super::box_widths::BoxWidths;
 use crate::grid::GridPlan;
 use crate::kernel::{BoxPolicy, Coordinates, Scheme, Select, domain};
 use crate::particle::Chunk;

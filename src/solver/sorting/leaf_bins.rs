@@ -7,7 +7,7 @@
 //! equal parts, each treated in the same way; its weights are the mean of theirs.
 
 use super::bin_members::BinMembers;
-use super::bins::{BinMissing, BoxWidths};
+use super::box_widths::{BinMissing, BoxWidths};
 use super::leaf_faces::{LeafFaces, NearLeaf, Side, near_leaf};
 use crate::grid::mask::{offset, offset_count};
 use crate::grid::plan::bin_reach::leaves_around;

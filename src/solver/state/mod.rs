@@ -17,10 +17,12 @@ use partition::Forest;
 use partition::comm::Comm;
 
 use self::grid::Grid;
+pub use self::parts::Effort;
+pub(in crate::solver) use self::parts::Weighed;
 use self::parts::{Adaptation, Balance, EquilibriumState, Measured, ParticleForces, Sums};
-use super::migration::migrate::{MigrateError, Moved};
-use super::sorting::bins::BinMissing;
-use crate::exact_sum::ExactSum;
+use super::migration::error::MigrateError;
+use super::migration::migrate::Moved;
+use super::sorting::box_widths::BinMissing;
 use crate::particle::Chunk;
 use crate::quantity::{FACES, NotFinite};
 use crate::solver::physics::Physics;
@@ -109,19 +111,6 @@ pub struct Clock {
     pub bound: f64,
 }
 
-/// How a load step went.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Effort {
-    /// Newton iterations.
-    pub newton: u32,
-    /// Iterations of linear systems.
-    pub linear: u32,
-    /// Unbalanced force over that of loads or stress, whichever is greater.
-    pub residual: f64,
-    /// Attempts at the step that were given up.
-    pub cuts: u32,
-}
-
 /// Results of a step, on this rank.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct StepReport {
@@ -140,13 +129,6 @@ pub struct Requests {
     pub stop: bool,
     /// Write a checkpoint.
     pub checkpoint: bool,
-}
-
-/// Mass of the particles, and on the real nodes, in one step, on one rank.
-#[derive(Clone, Debug)]
-pub(in crate::solver) struct Weighed {
-    pub(in crate::solver) particles: ExactSum,
-    pub(in crate::solver) nodes: ExactSum,
 }
 
 /// Particles, tree and clock of one rank, and the data to advance them.

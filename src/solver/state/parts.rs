@@ -9,7 +9,6 @@ use super::last_partition::LastPartition;
 use super::regrid_cache::RegridCache;
 use super::regrid_timers::RegridTimers;
 use super::relaxation::Relaxation;
-use super::{Effort, Weighed};
 use crate::adaptivity::resample::ledger::Ledger;
 use crate::exact_sum::ExactSum;
 use crate::material::SHOCK_SUMS;
@@ -132,4 +131,24 @@ pub struct Balance {
     pub partitions: u64,
     pub(in crate::solver) is_to_weigh: bool,
     pub(in crate::solver) weighed: Option<Weighed>,
+}
+
+/// How a load step went.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Effort {
+    /// Newton iterations.
+    pub newton: u32,
+    /// Iterations of linear systems.
+    pub linear: u32,
+    /// Unbalanced force over that of loads or stress, whichever is greater.
+    pub residual: f64,
+    /// Attempts at the step that were given up.
+    pub cuts: u32,
+}
+
+/// Mass of the particles, and on the real nodes, in one step, on one rank.
+#[derive(Clone, Debug)]
+pub(in crate::solver) struct Weighed {
+    pub(in crate::solver) particles: ExactSum,
+    pub(in crate::solver) nodes: ExactSum,
 }

@@ -11,7 +11,7 @@ use crate::kernel::Row;
 use crate::leapfrog::Lengths;
 use crate::quantity::in_job;
 use crate::solver::physics::Physics;
-use crate::solver::sorting::bins::BinMissing;
+use crate::solver::sorting::box_widths::BinMissing;
 use crate::solver::state::Solver;
 use crate::solver::state::bookings::SUMS;
 use crate::solver::state::grid::Solids;

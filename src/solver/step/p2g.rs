@@ -8,7 +8,7 @@ use crate::leapfrog::Lengths;
 use crate::particle::Chunk;
 use crate::particle::chunk::{Layout, Place, Tag};
 use crate::solver::sorting::bin_view::BinView;
-use crate::solver::sorting::bins::BinMissing;
+use crate::solver::sorting::box_widths::BinMissing;
 use crate::solver::state::Solver;
 
 impl<const D: usize> Solver<D> {

@@ -12,7 +12,7 @@ use crate::particle::Chunk;
 use crate::particle::chunk::{Layout, TILE};
 use crate::particle::group::Group;
 use crate::particle::volume::{box_volume, volume_ratios};
-use crate::solver::sorting::bins::BinMissing;
+use crate::solver::sorting::box_widths::BinMissing;
 use crate::solver::state::Solver;
 use crate::solver::state::grid::Solids;
 use crate::solver::step::p2g::scatter;

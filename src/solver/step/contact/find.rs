@@ -10,7 +10,7 @@ use crate::kernel::{Select, domain};
 use crate::leapfrog::Lengths;
 use crate::particle::chunk::{Chunk, Layout};
 use crate::particle::volume::volume;
-use crate::solver::sorting::bins::BoxWidths;
+use crate::solver::sorting::box_widths::BoxWidths;
 use crate::solver::state::Solver;
 use crate::solver::state::bookings::Near;
 use crate::solver::state::phases::Phase;

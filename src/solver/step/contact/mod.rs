@@ -32,7 +32,7 @@ use crate::boundary::motion::Rate;
 use crate::exact_sum::ExactSum;
 use crate::leapfrog::Lengths;
 use crate::particle::Chunk;
-use crate::solver::sorting::bins::BinMissing;
+use crate::solver::sorting::box_widths::BinMissing;
 use crate::solver::state::Solver;
 use crate::solver::state::bookings::SUMS;
 use crate::solver::state::grid::VelocityField;

@@ -38,7 +38,7 @@ use crate::grid::Window;
 use crate::grid::mask::{bits, block_nodes};
 use crate::grid::plan::needed_nodes::nodes_in_domain;
 use crate::leapfrog::Lengths;
-use crate::solver::sorting::bins::BinMissing;
+use crate::solver::sorting::box_widths::BinMissing;
 use crate::solver::state::Solver;
 use crate::solver::state::bookings::SUMS;
 use crate::solver::state::grid::VelocityField;
