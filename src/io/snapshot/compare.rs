@@ -4,9 +4,8 @@ use std::path::Path;
 
 use partition::comm::{Comm, Disagreement};
 
-use super::content::state::{
-    self, CARRIED, carried_columns, carried_components, check_tree, columns, octants, path,
-};
+use super::content::columns::{CARRIED, columns};
+use super::content::state::{self, carried_columns, carried_components, check_tree, octants, path};
 use super::header::Header;
 use super::intact::checked::{self, Checked};
 use super::intact::sane::{self, Limits};

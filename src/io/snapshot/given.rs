@@ -1,8 +1,8 @@
 //! Particles of a file as those of another job.
 use std::path::Path;
 
-use super::content::state::columns;
-use super::header::{GROUP, Header};
+use super::content::columns::columns;
+use super::header::{GROUP, Header, compatible};
 use super::intact::checked::Checked;
 use crate::io::hdf5_file::{FileError, Reader};
 use crate::particle::chunk::{Chunk, Tag};
@@ -36,7 +36,7 @@ pub fn particles<const D: usize>(path: &Path, body: &str, origin: &[f64; D]) -> 
     if header.dimension != D {
         return Err(file.refuse(format!("it is from a {}D run, but the job is {D}D", header.dimension)));
     }
-    if !super::compatible(&header.program) {
+    if !compatible(&header.program) {
         return Err(
             file.refuse(format!("it is from agimp {}, which uses another format of states", header.program))
         );

@@ -2,9 +2,9 @@
 
 use partition::{MAX_LEVEL, Octant};
 
-use super::View;
+use super::scalars::Scalars;
+use super::view::View;
 use crate::io::hdf5_file::{FileError, Reader, Writer};
-use crate::kernel::Coordinates;
 
 /// Version of the layout of the state. A file of another one is refused.
 pub const FORMAT: u64 = 2;
@@ -12,47 +12,8 @@ pub const FORMAT: u64 = 2;
 const MAGIC: &str = "agimp state";
 /// Steps are counted in real numbers too, which hold whole numbers up to this.
 const MOST_STEPS: u64 = 1 << 53;
-/// Counter among the scalars of files of axisymmetric jobs.
-pub const AXISYMMETRIC: &str = "axisymmetric";
 /// The group with the header and, in files that a run can restart from, the state.
 pub(super) const GROUP: &str = "state";
-
-/// Scalars that are saved and come back bit by bit.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Scalars {
-    /// Real numbers by name.
-    pub reals: Vec<(String, f64)>,
-    /// Counters by name.
-    pub counts: Vec<(String, u64)>,
-    /// Words of exact sums (see [`crate::exact_sum`]) by name.
-    pub exact: Vec<(String, Vec<i64>)>,
-}
-
-impl Scalars {
-    /// The real number of that name.
-    pub fn real(&self, name: &str) -> Option<f64> {
-        find(&self.reals, name).copied()
-    }
-
-    /// The counter of that name.
-    pub fn count(&self, name: &str) -> Option<u64> {
-        find(&self.counts, name).copied()
-    }
-
-    /// Coordinates of the domain.
-    pub fn coordinates(&self) -> Coordinates {
-        if self.count(AXISYMMETRIC).is_some() { Coordinates::Axisymmetric } else { Coordinates::Cartesian }
-    }
-
-    /// The words of the exact sum of that name.
-    pub fn exact(&self, name: &str) -> Option<&[i64]> {
-        find(&self.exact, name).map(Vec::as_slice)
-    }
-}
-
-fn find<'a, T>(list: &'a [(String, T)], name: &str) -> Option<&'a T> {
-    list.iter().find(|(n, _)| n == name).map(|(_, value)| value)
-}
 
 /// The header of a file.
 #[derive(Clone, Debug, PartialEq)]
@@ -331,5 +292,28 @@ fn only<T: Copy>(file: &Reader, name: &str, values: Vec<T>) -> Result<T, FileErr
     match values[..] {
         [value] => Ok(value),
         _ => Err(file.refuse(format!("attribute {name} has {} values, not one", values.len()))),
+    }
+}
+
+/// States are continued within one minor version below 1.0 and one major version from there on.
+pub(crate) fn compatible(program: &str) -> bool {
+    let series = |version: &str| -> Option<(u64, u64)> {
+        let mut parts = version.split('.').map(|part| part.parse().ok());
+        let (major, minor) = (parts.next()??, parts.next()??);
+        Some(if major == 0 { (0, minor) } else { (major, 0) })
+    };
+    series(program).is_some() && series(program) == series(env!("CARGO_PKG_VERSION"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::compatible;
+
+    #[test]
+    fn states_of_the_same_series_are_continued() {
+        assert!(compatible(env!("CARGO_PKG_VERSION")));
+        assert!(!compatible("9999.0.0"));
+        assert!(!compatible(""));
+        assert!(!compatible("new"));
     }
 }

@@ -7,7 +7,8 @@
 //! | file or folder | content |
 //! |---|---|
 //! | this | files written and read |
-//! | [`header`], `place.rs` | the header of a file, and the place of its job file |
+//! | `view.rs`, `options.rs` | the run as a file shows it; optional contents |
+//! | [`header`], `scalars.rs`, `place.rs` | the header of a file with its scalars, and the place of its job file |
 //! | `content/` | particle fields, groups for viewers and restarts |
 //! | `intact/` | checksums, limits, and the way to disk |
 //! | [`outputs`], [`directory`] | the numbered files of a run; finding and keeping them |
@@ -17,13 +18,8 @@
 use std::path::Path;
 
 use partition::comm::Comm;
-use partition::{Brick, Octant};
 
 use super::hdf5_file::{FileError, Reader, Writer};
-use crate::load::Water;
-use crate::particle::chunk::Chunk;
-use crate::particle::followed::Followed;
-use crate::probe::{Map, Maxima};
 
 pub mod compare;
 pub(crate) mod content;
@@ -31,100 +27,26 @@ pub mod directory;
 mod given;
 pub mod header;
 pub mod intact;
+mod options;
 pub mod outputs;
 mod place;
+mod scalars;
+mod view;
 
 pub use content::fields::PointField;
+pub use content::state::Restored;
 use content::{state, vtkhdf};
 pub use given::particles;
-pub use header::{AXISYMMETRIC, Header, Scalars};
+pub use header::Header;
+pub(crate) use header::compatible;
 use intact::checked::{Checked, Recorded, Rows};
 use intact::commit::Unnamed;
 pub use intact::sane::Limits;
+pub use options::Options;
 pub use outputs::Outputs;
 pub use place::job_files;
-
-/// The run as a file shows it: borrowed, this rank's part.
-#[derive(Clone, Copy, Debug)]
-pub struct View<'a, const D: usize> {
-    /// Leaves of this rank, in curve order.
-    pub leaves: &'a [Octant<D>],
-    /// Particles of each leaf.
-    pub chunks: &'a [Chunk<D>],
-    /// Quantities that particles carry of their past.
-    pub followed: Followed,
-    /// Extra values per leaf; the same names on all ranks.
-    pub leaf_fields: &'a [(String, Vec<f64>)],
-    /// Rasters in plan.
-    pub maps: &'a [Map],
-    /// Their largest values so far, the same on all ranks.
-    pub maxima: &'a [Maxima],
-    /// Lower corner of the domain, m.
-    pub origin: [f64; D],
-    /// Edge of a root octant, m.
-    pub root_edge: f64,
-    /// Root octants.
-    pub brick: Brick<D>,
-    /// Names of the materials.
-    pub materials: &'a [String],
-    /// Stiffness of water that cannot leave the pores, by material, Pa; 0 where there is none.
-    pub water_moduli: &'a [f64],
-    /// Water in the pores, where it acts.
-    pub water: Option<ShownWater<'a, D>>,
-    /// Names of the bodies.
-    pub bodies: &'a [String],
-    /// Names of the history variables.
-    pub histories: &'a [String],
-    /// Digest of the job.
-    pub job_digest: u64,
-    /// Text of the job file.
-    pub job_text: &'a str,
-    /// The job file, from the root of the file system; empty if that is not known.
-    pub job_file: &'a Path,
-    /// Steps done.
-    pub step: u64,
-    /// Simulated time, s.
-    pub time: f64,
-    /// Last time step, s.
-    pub dt: f64,
-    /// Scalars to be restored.
-    pub scalars: &'a Scalars,
-}
-
-/// Water in the pores as a file shows it.
-#[derive(Clone, Copy, Debug)]
-pub struct ShownWater<'a, const D: usize> {
-    /// The water.
-    pub water: &'a Water,
-    /// Time from which its own time is counted, s.
-    pub since: f64,
-    /// Gravity, m/s².
-    pub gravity: [f64; D],
-}
-
-/// Optional contents of a file.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Options {
-    /// Fields of the particles for ParaView.
-    pub fields: Vec<PointField>,
-    /// Those fields in single precision, but for those that the restart state holds already: that never is.
-    pub single: bool,
-    /// Also write all that a restart needs.
-    pub restart: bool,
-}
-
-/// A run read back: this rank's share, to be partitioned anew by the caller.
-#[derive(Clone, Debug)]
-pub struct Restored<const D: usize> {
-    /// Header of the file, with the scalars.
-    pub header: Header,
-    /// Leaves of this rank: a contiguous part of the curve.
-    pub leaves: Vec<Octant<D>>,
-    /// Particles of each leaf.
-    pub chunks: Vec<Chunk<D>>,
-    /// Extra values per leaf.
-    pub leaf_fields: Vec<(String, Vec<f64>)>,
-}
+pub use scalars::{AXISYMMETRIC, Scalars};
+pub use view::{ShownWater, View};
 
 /// Collective. Writes particles, and the state if `options` ask for it, to `path`. An error on any rank is
 /// one on all ranks, and no file of that name is made or changed; a state with numbers that are not finite is
@@ -242,16 +164,6 @@ pub fn map_values(path: &Path, name: &str, what: &str, cells: usize) -> Option<V
 /// Bytes of the longest job file that is read back.
 const LONGEST_JOB: u64 = 1 << 26;
 
-/// States are continued within one minor version below 1.0 and one major version from there on.
-pub(crate) fn compatible(program: &str) -> bool {
-    let series = |version: &str| -> Option<(u64, u64)> {
-        let mut parts = version.split('.').map(|part| part.parse().ok());
-        let (major, minor) = (parts.next()??, parts.next()??);
-        Some(if major == 0 { (0, minor) } else { (major, 0) })
-    };
-    series(program).is_some() && series(program) == series(env!("CARGO_PKG_VERSION"))
-}
-
 /// Collective. Places of this rank's leaves and particles; refuses a view that does not fit together.
 fn totals<const D: usize>(comm: &Comm, file: &Writer, view: &View<D>) -> Result<(Rows, Rows), FileError> {
     let lengths = view.leaf_fields.iter().map(|(_, values)| values.len()).chain([view.chunks.len()]);
@@ -263,17 +175,4 @@ fn totals<const D: usize>(comm: &Comm, file: &Writer, view: &View<D>) -> Result<
     })?;
     let particles = view.chunks.iter().map(|chunk| chunk.len() as u64).sum();
     Ok((Rows::place(comm, view.leaves.len() as u64), Rows::place(comm, particles)))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::compatible;
-
-    #[test]
-    fn states_of_the_same_series_are_continued() {
-        assert!(compatible(env!("CARGO_PKG_VERSION")));
-        assert!(!compatible("9999.0.0"));
-        assert!(!compatible(""));
-        assert!(!compatible("new"));
-    }
 }

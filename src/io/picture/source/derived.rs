@@ -4,8 +4,8 @@
 use super::super::Tint;
 use super::numbers;
 use crate::io::hdf5_file::{FileError, Reader};
-use crate::io::snapshot::content::averages::{principal, third_invariant};
-use crate::io::snapshot::content::fields::{COMPONENTS, mean, von_mises};
+use crate::io::snapshot::content::averages::{mean, principal, third_invariant, von_mises};
+use crate::io::snapshot::content::fields::COMPONENTS;
 use crate::io::snapshot::intact::checked::Checked;
 use crate::io::snapshot::{Header, PointField};
 use crate::material::{PLASTIC_STRAIN, PLASTIC_VOLUME};

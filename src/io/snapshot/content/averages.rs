@@ -1,9 +1,8 @@
-//! Averages of stress over cells and leaves, and principal stresses.
+//! Averages of stress over cells and leaves, principal stresses and invariants.
 //!
 //! Stresses of single particles differ from neighbour to neighbour where material flows; their mean by volume
 //! over a cell does not. Sums go over the particles of one leaf in their order, which is the same on any
 //! ranks.
-use super::fields::{mean, von_mises};
 use crate::grid::leaf_geometry::LeafCells;
 use crate::kernel::BLOCK;
 use crate::particle::chunk::Chunk;
@@ -80,6 +79,19 @@ pub(crate) fn third_invariant(stress: &[f64; 6]) -> f64 {
     let mean = mean(stress);
     let [xx, yy, zz] = [xx - mean, yy - mean, zz - mean];
     xx * (yy * zz - yz * yz) - xy * (xy * zz - yz * xz) + xz * (xy * yz - yy * xz)
+}
+
+/// A third of the trace.
+pub(crate) fn mean(stress: &[f64; 6]) -> f64 {
+    (stress[0] + stress[1] + stress[2]) / 3.0
+}
+
+/// √(3/2 s:s) with the deviator s.
+pub(crate) fn von_mises(stress: &[f64; 6]) -> f64 {
+    let mean = mean(stress);
+    let diagonal: f64 = stress[..3].iter().map(|s| (s - mean) * (s - mean)).sum();
+    let shear: f64 = stress[3..].iter().map(|s| s * s).sum();
+    (1.5 * (diagonal + 2.0 * shear)).sqrt()
 }
 
 #[cfg(test)]

@@ -3,9 +3,9 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::averages::{self, principal};
+use super::averages::{self, mean, principal, von_mises};
 use crate::grid::leaf_geometry::{LeafCells, leaf_box};
-use crate::io::snapshot::{ShownWater, View};
+use crate::io::snapshot::view::{ShownWater, View};
 use crate::particle::chunk::{Chunk, Layout, Tag};
 use crate::particle::followed::{FirstColumns, head};
 use crate::particle::volume::{cauchy_stress, volume, volume_ratio};
@@ -319,22 +319,9 @@ fn density<const D: usize>(chunk: &Chunk<D>, p: usize) -> f64 {
     chunk.column(Layout::<D>::MASS)[p] / volume(chunk, p)
 }
 
-/// A third of the trace.
-pub(crate) fn mean(stress: &[f64; 6]) -> f64 {
-    (stress[0] + stress[1] + stress[2]) / 3.0
-}
-
 /// Equivalent strain √(2/3 e:e) with the deviator e.
 fn equivalent(strain: &[f64; 6]) -> f64 {
     2.0 / 3.0 * von_mises(strain)
-}
-
-/// √(3/2 s:s) with the deviator s.
-pub(crate) fn von_mises(stress: &[f64; 6]) -> f64 {
-    let mean = mean(stress);
-    let diagonal: f64 = stress[..3].iter().map(|s| (s - mean) * (s - mean)).sum();
-    let shear: f64 = stress[3..].iter().map(|s| s * s).sum();
-    (1.5 * (diagonal + 2.0 * shear)).sqrt()
 }
 
 #[cfg(test)]

@@ -4,8 +4,8 @@
 use partition::Octant;
 use partition::comm::Comm;
 
-use super::averages::{LeafAverage, over_leaf, principal};
-use super::fields::{PointField, Values, mean, von_mises};
+use super::averages::{LeafAverage, mean, over_leaf, principal, von_mises};
+use super::fields::{PointField, Values};
 use super::state::path;
 use crate::io::hdf5_file::{Element, FileError, Writer};
 use crate::io::snapshot::intact::checked::{Recorded, Rows};

@@ -3,9 +3,9 @@
 use partition::{MAX_LEVEL, Octant};
 
 use crate::grid::leaf_geometry::position_key;
-use crate::io::snapshot::View;
-use crate::io::snapshot::content::state::{CARRIED, columns};
+use crate::io::snapshot::content::columns::{CARRIED, columns};
 use crate::io::snapshot::header::Header;
+use crate::io::snapshot::view::View;
 use crate::particle::chunk::{TILE, Tag};
 use crate::text::{number, place};
 
