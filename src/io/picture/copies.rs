@@ -1,9 +1,9 @@
 //! Copies of what is drawn: images behind planes of symmetry, and bodies of revolution in space.
 
 use super::camera::Bounds;
-use super::scene::Splat;
+use super::drawing::Drawing;
+use super::scene::{LARGER, Splat};
 use super::settings::Settings;
-use super::{Drawing, LARGER};
 use crate::io::revolve::{self, Revolve};
 use crate::io::snapshot::Header;
 

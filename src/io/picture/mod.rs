@@ -7,9 +7,10 @@
 //! |---|---|
 //! | this | the parts of a picture, and their composition |
 //! | `settings.rs` | options of a picture |
+//! | `drawing.rs` `tint.rs` | what a picture is drawn from; meaning of its colours |
 //! | `camera.rs` | projection from space to pixels |
 //! | `scene.rs`, `solids.rs`, `tree.rs` | particles with their light; colliders; leaves |
-//! | `boxes.rs`, `arrows.rs` | widths of particles; vectors |
+//! | `boxes.rs`, `vectors.rs`, `arrows.rs` | widths of particles; vectors; their arrows |
 //! | `copies.rs` | mirror images and bodies of revolution |
 //! | `canvas.rs`, `colour.rs`, `scales.rs` | an image and its file; colours; legends |
 //! | `heading.rs`, `font.rs` | title and caption; letters |
@@ -31,6 +32,7 @@ mod camera;
 mod canvas;
 mod colour;
 mod copies;
+mod drawing;
 mod font;
 mod heading;
 mod scales;
@@ -38,23 +40,27 @@ mod scene;
 mod settings;
 mod solids;
 pub(super) mod source;
+mod tint;
 mod tree;
+mod vectors;
 
-use arrows::Vectors;
 pub use boxes::Boxes;
 pub use camera::View as Direction;
 use camera::{Bounds, Camera};
 use canvas::Canvas;
 pub use colour::Map;
 pub(crate) use colour::further;
+use drawing::Drawing;
 use heading::Heading;
 use scales::{Plot, colour_bar, legend, nice};
-use scene::{Looks, Raster, Splat};
+use scene::{LARGER, Looks, Raster, Splat};
 pub use settings::{Clip, Look, Settings, place};
 use solids::Layer;
 pub use solids::{Distance, Solid};
-use source::derived::{Source, is_class, magnitude};
+use source::derived::{Source, magnitude};
+use tint::Tint;
 use tree::leaves;
+use vectors::Vectors;
 
 /// Surroundings of the particles in a picture.
 #[derive(Debug, Default)]
@@ -68,55 +74,8 @@ pub struct Scene {
 /// The scene at the time of a file.
 pub type SceneOf<'a> = dyn Fn(&Header) -> Scene + 'a;
 
-/// Meaning of the colours of a picture.
-#[derive(Clone, Debug, PartialEq, Eq)]
-struct Tint {
-    /// Name of the quantity.
-    name: String,
-    /// Its unit, empty for pure numbers.
-    unit: String,
-    /// Whether its values number classes, such as bodies, rather than measure amounts.
-    classes: bool,
-    /// Names of these numbers, from 0 on, if they have names.
-    names: Vec<String>,
-}
-
-impl Tint {
-    fn of(field: PointField, materials: &[String], bodies: &[String]) -> Self {
-        let (name, unit) = (field.name().to_owned(), field.unit().to_owned());
-        Self { classes: is_class(&name), unit, names: Vec::new(), name }.named(materials, bodies)
-    }
-
-    /// With the names that its numbers stand for.
-    fn named(self, materials: &[String], bodies: &[String]) -> Self {
-        let names = match &*self.name {
-            "material" => materials.to_vec(),
-            "body" => bodies.to_vec(),
-            _ => Vec::new(),
-        };
-        Self { names, ..self }
-    }
-}
-
 /// Free space beside the drawing: left, right, top, bottom, in units of the layout.
 const MARGINS: [f64; 4] = [40.0, 190.0, 110.0, 60.0];
-/// Radius of balls over the half width of the particles' boxes, so that no gaps are seen between them.
-const LARGER: f64 = 1.2;
-
-/// The particles of one rank and what all ranks know.
-#[derive(Debug)]
-struct Drawing {
-    flat: bool,
-    domain: Bounds,
-    /// Values are not yet scaled.
-    splats: Vec<Splat>,
-    tint: Tint,
-    caption: String,
-    solids: Vec<Solid>,
-    /// Leaves of the tree, if they are drawn: lower corner and edge, m.
-    leaves: Vec<([f64; 3], f64)>,
-    vectors: Vectors,
-}
 
 /// Collective. Draws the particles of a run, coloured by `field` (of vectors the magnitude), and writes the
 /// picture as PNG on rank 0.

@@ -1,10 +1,10 @@
 //! Scales, legends and numbers beside a picture.
 use std::ops::RangeInclusive;
 
-use super::Tint;
 use super::camera::{Bounds, Camera};
 use super::canvas::Canvas;
 use super::colour::{Map, Paper, Rgb, class};
+use super::tint::Tint;
 use crate::text::{number, without_zeros};
 
 /// From the legend to the right edge, in units of the layout.

@@ -1,10 +1,12 @@
 //! Depth buffer and shading.
 
-use super::LARGER;
 use super::camera::{Bounds, Camera};
 use super::canvas::Canvas;
 use super::colour::{Paper, Rgb, mixed, scaled};
 use super::solids::Layer;
+
+/// Radius of balls over the half width of the particles' boxes, so that no gaps are seen between them.
+pub(super) const LARGER: f64 = 1.2;
 
 /// A particle to be drawn.
 #[derive(Clone, Copy, Debug)]

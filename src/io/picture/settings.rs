@@ -1,6 +1,5 @@
 //! Options of a picture.
-use super::Direction;
-use super::camera::numbers;
+use super::camera::{View as Direction, numbers};
 use super::colour::{DARK, LIGHT, Map, Paper};
 use crate::io::revolve::Revolve;
 

@@ -3,9 +3,10 @@ use std::path::Path;
 
 use super::camera::{Bounds, Camera};
 use super::canvas::Canvas;
+use super::drawing::Drawing;
 use super::scene::Raster;
+use super::settings::Settings;
 use super::solids::Layer;
-use super::{Drawing, Settings};
 use crate::io::frame::Leaves;
 use crate::io::hdf5_file::FileError;
 use crate::io::snapshot::Header;

@@ -1,9 +1,9 @@
 //! Quantities that can colour the particles of a file: its fields, and those derived from them or from its
 //! state.
 
-use super::super::Tint;
 use super::numbers;
 use crate::io::hdf5_file::{FileError, Reader};
+use crate::io::picture::tint::{Tint, is_class};
 use crate::io::snapshot::content::averages::{mean, principal, third_invariant, von_mises};
 use crate::io::snapshot::content::fields::COMPONENTS;
 use crate::io::snapshot::intact::checked::Checked;
@@ -237,11 +237,6 @@ impl<'f> Source<'f> {
 
 const TAG: &str = "state/particles/tag";
 const LEVEL: &str = "state/tree/level";
-
-/// Whether the numbers of a quantity are names rather than amounts.
-pub(in crate::io::picture) fn is_class(name: &str) -> bool {
-    ["material", "body", "particle_level", "leaf_level"].contains(&name)
-}
 
 /// Length of a vector; of six components √(σ:σ) of the symmetric tensor.
 pub(in crate::io::picture) fn magnitude(row: &[f64]) -> f64 {
