@@ -15,7 +15,7 @@ use crate::job::{Problem, Settings};
 use crate::report::{self, Results};
 use crate::run::cores::Cores;
 use crate::run::stop::StopRequest;
-use crate::run::{self, Effort, Options, Outcome, RunError, Summary, restart};
+use crate::run::{self, Effort, Options, Outcome, RunError, Summary};
 use crate::setup::estimate::steps;
 use crate::setup::warnings::warnings;
 use crate::text::{count, counted, quantity, shell_word, wall_time};
@@ -78,8 +78,8 @@ pub(super) fn execute(arguments: &Arguments) -> Result<(), Failure> {
     };
     let options = Options {
         restart: arguments.restart.as_deref().map(|from| match from.to_str() {
-            Some("latest") => restart::From::Latest,
-            _ => restart::From::File(from.into()),
+            Some("latest") => run::From::Latest,
+            _ => run::From::File(from.into()),
         }),
         overwrite: arguments.overwrite,
         speaks: comm.rank() == 0 && !arguments.quiet,

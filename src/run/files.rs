@@ -3,35 +3,13 @@ use std::path::PathBuf;
 use std::time::Instant;
 
 use super::measures::maps;
+use super::names::Names;
 use super::{Run, RunError, restart, scene};
 use crate::io::picture;
 use crate::io::snapshot::{PointField, Scalars, ShownWater, View};
 use crate::job::Problem;
 use crate::solver::Solver;
 use crate::solver::state::phases::Phase;
-
-/// Names that files carry, in the order of the numbers in tags.
-pub(super) struct Names {
-    materials: Vec<String>,
-    /// Stiffness of water that cannot leave the pores, by material, Pa.
-    water_moduli: Vec<f64>,
-    bodies: Vec<String>,
-    histories: Vec<String>,
-    /// The job file, from the root of the file system; empty if it is not there any more.
-    job_file: PathBuf,
-}
-
-impl Names {
-    pub(super) fn of<const D: usize>(problem: &Problem<D>, solver: &Solver<D>) -> Self {
-        Self {
-            materials: problem.materials.iter().map(|material| material.name.clone()).collect(),
-            water_moduli: solver.physics.materials.iter().map(|m| m.water_modulus()).collect(),
-            bodies: problem.bodies.iter().map(|body| body.name.clone()).collect(),
-            histories: solver.physics.materials.iter().map(|m| m.history_names().join(" ")).collect(),
-            job_file: problem.path.canonicalize().unwrap_or_default(),
-        }
-    }
-}
 
 impl<const D: usize> Run<'_, D> {
     /// Collective. Draws the last state. All results are on disk by now, so a failure is only a message.

@@ -9,7 +9,7 @@
 //! | [`restart`] | states from files |
 //! | `room.rs` | check of the memory of the machines |
 //! | [`schedule`], [`stop`] | when files are due; requests to stop |
-//! | `files.rs`, [`scene`] | outputs, checkpoints and pictures; colliders in pictures |
+//! | `files.rs`, `names.rs`, [`scene`] | outputs, checkpoints and pictures; names in them; colliders in pictures |
 //! | [`record`], [`history`] | history, telemetry and progress |
 //! | `measures/` | files of lines and maps |
 //! | [`at_end`] | results at the end of a run |
@@ -19,6 +19,7 @@ pub mod cores;
 mod files;
 pub mod history;
 mod measures;
+mod names;
 mod outcome;
 pub mod record;
 pub mod restart;
@@ -35,10 +36,9 @@ use self::at_end::ending::Ending;
 use self::at_end::{collapse, ending, report};
 use self::claim::Claim;
 use self::cores::Cores;
-use self::files::Names;
-pub use self::outcome::{Effort, Options, Outcome, RunError, Summary};
+use self::names::Names;
+pub use self::outcome::{Effort, From, Options, Outcome, RunError, Summary};
 use self::record::Recorder;
-use self::restart::From;
 use self::room::Room;
 use self::schedule::Schedule;
 use self::stop::StopRequest;

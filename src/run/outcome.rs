@@ -1,11 +1,10 @@
 //! How a run is started, how it ends, and why it cannot.
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use partition::comm::Disagreement;
 
 use crate::io::hdf5_file::FileError;
 use crate::run::at_end::collapse::Collapse;
-use crate::run::restart::From;
 use crate::solver::Clock;
 
 /// How a run is started.
@@ -112,5 +111,24 @@ impl RunError {
             Self::Step { .. } | Self::After { .. } => self,
             other => Self::After { step: clock.step, time: clock.time, source: Box::new(other) },
         }
+    }
+}
+
+/// The file from which a run continues.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum From {
+    /// The newest complete file of the run.
+    Latest,
+    /// This file.
+    File(PathBuf),
+}
+
+impl From {
+    /// Not collective. Whether the file lies in this directory, that of the results of the run.
+    pub fn is_in(&self, directory: &Path) -> bool {
+        let Self::File(path) = self else { return true };
+        let parent = path.parent().filter(|parent| !parent.as_os_str().is_empty());
+        let [own, other] = [parent.unwrap_or(Path::new(".")), directory].map(Path::canonicalize);
+        own.is_ok_and(|own| other.is_ok_and(|other| own == other))
     }
 }

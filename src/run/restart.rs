@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use partition::Forest;
 use partition::comm::Comm;
 
-use super::{RunError, measures};
+use super::{From, RunError, measures};
 use crate::adaptivity::resample::ids;
 use crate::boundary::{Collider, ColliderState};
 use crate::exact_sum::ExactSum;
@@ -27,25 +27,6 @@ use crate::solver::state::cost::leaf_weight;
 use crate::solver::state::relaxation::{RelaxPhase, Relaxation};
 use crate::solver::{Clock, Solver};
 use crate::text::{quantity, written};
-
-/// The file from which a run continues.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub enum From {
-    /// The newest complete file of the run.
-    Latest,
-    /// This file.
-    File(PathBuf),
-}
-
-impl From {
-    /// Not collective. Whether the file lies in this directory, that of the results of the run.
-    pub fn is_in(&self, directory: &Path) -> bool {
-        let Self::File(path) = self else { return true };
-        let parent = path.parent().filter(|parent| !parent.as_os_str().is_empty());
-        let [own, other] = [parent.unwrap_or(Path::new(".")), directory].map(Path::canonicalize);
-        own.is_ok_and(|own| other.is_ok_and(|other| own == other))
-    }
-}
 
 /// Name of the counter that holds the number of the next output.
 pub const NEXT_OUTPUT: &str = "next_output";

@@ -8,7 +8,7 @@ use std::time::Instant;
 
 use agimp::job::{AnyProblem, Problem, parse};
 use agimp::particle::Chunk;
-use agimp::run::restart::{self, From};
+use agimp::run::{From, restart};
 use agimp::setup;
 use agimp::solver::state::regrid_timers::Part;
 use agimp::solver::{Requests, Solver};
