@@ -11,8 +11,9 @@ use partition::comm::{Comm, Disagreement};
 use rayon::prelude::*;
 use rustc_hash::FxHashMap;
 
+use super::lattice::{lattice_of, spacing};
 use super::parts::{has_parts, is_in_box};
-use super::seed::{NumberedPlace, SeedError, lattice_of, lattice_places, spacing};
+use super::seed::{NumberedPlace, SeedError, lattice_places};
 use crate::exact_sum::ExactSum;
 use crate::geometry::surface::{Patch, Region, patches};
 use crate::geometry::{Aabb, Side};

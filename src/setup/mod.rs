@@ -1,21 +1,35 @@
 //! From a job to the first state: tree, partition and particles.
+//!
+//! | file or folder | what it holds |
+//! |---|---|
+//! | this | the first tree, and the solver on it |
+//! | `constant`, [`stages`] | physics without the changes of stages, and with them |
+//! | `particles`, [`seed`], `lattice` | particles that come with a stage; of one leaf; places of a body's lattice |
+//! | `parts`, `carried` | particles at surfaces of fitted bodies; surfaces under loads |
+//! | `materials`, [`walls`], `water` | materials of bodies by stage; colliders that hold fluids; heads of water |
+//! | [`initial_stress`] | stress at the start |
+//! | [`estimate`], [`warnings`] | size and duration of a job; likely mistakes in it |
 use std::convert::Infallible;
 
 use partition::comm::{Comm, Disagreement};
 use partition::{Forest, MAX_LEVEL, Octant};
 use rayon::prelude::*;
 
-use self::initial_stress::{Which, put_under_stress};
-use self::seed::{SeedError, check_counts, check_finite, count_leaf, fill_leaf};
+use self::particles::new_particles;
+use self::seed::{SeedError, check_counts, count_leaf};
 use crate::job::Problem;
 use crate::particle::chunk::{Chunk, Tag};
 use crate::solver::balance::rebalance::cut_at;
 use crate::solver::state::cost::leaf_cost;
-use crate::solver::{Clock, Physics, Solver, StepControl, Ties};
+use crate::solver::{Clock, Physics, Solver};
 
 mod carried;
+mod constant;
 pub mod estimate;
 pub mod initial_stress;
+mod lattice;
+mod materials;
+mod particles;
 mod parts;
 pub mod seed;
 pub mod stages;
@@ -26,55 +40,6 @@ mod water;
 /// Physics of the first stage of a run.
 pub fn physics<const D: usize>(problem: &Problem<D>) -> Physics<D> {
     stages::physics(problem, &[0.0])
-}
-
-/// Physics of the job without the changes of stages.
-fn constant_physics<const D: usize>(problem: &Problem<D>) -> Physics<D> {
-    Physics {
-        stage_starts: vec![0.0],
-        origin: problem.origin,
-        root_edge: problem.root_edge,
-        graded: problem.tree.graded,
-        materials: problem.materials.iter().map(|m| m.build()).collect(),
-        failed: problem.materials.iter().map(|material| material.failed).collect(),
-        gravity: problem.gravity.clone(),
-        loads: problem.loads.clone(),
-        seepage: problem.seepage.clone(),
-        saturated: problem.materials.iter().map(|m| m.saturated_density / m.density).collect(),
-        sources: problem.sources.clone(),
-        faces: problem.faces,
-        with_moments: with_moments(problem),
-        absorbing: problem.absorbing.clone(),
-        face_forces: problem.face_forces,
-        colliders: problem.colliders.clone(),
-        body_contacts: problem.body_contacts.clone(),
-        adaptivity: problem.adaptivity.clone(),
-        leaving: problem.leaving,
-        equilibrium: None,
-        quasi_static: problem.quasi_static,
-        fill_densities: Vec::new(),
-        meets: Vec::new(),
-        transfer: problem.transfer,
-        coordinates: problem.coordinates,
-        boxes: problem.boxes,
-        cohesion: None,
-        has_halves: false,
-        f_bar: problem.f_bar,
-        viscosity: problem.viscosity,
-        ties: if problem.quasi_static.is_some() { Ties::All } else { problem.ties },
-        followed: problem.output.followed,
-        control: StepControl {
-            cfl: problem.time.cfl,
-            dt_max: problem.time.dt_max,
-            growth: problem.time.growth,
-        },
-    }
-}
-
-/// Bodies from a file that says how their particles move.
-fn with_moments<const D: usize>(problem: &Problem<D>) -> Vec<u16> {
-    let moves = |body: &usize| problem.bodies[*body].given.as_ref().is_some_and(|given| given.has_velocity);
-    (0..problem.bodies.len()).filter(moves).map(|body| body as u16).collect()
 }
 
 /// Collective. A solver in the initial state of the job: tree, partition and numbered particles.
@@ -147,38 +112,6 @@ fn seeded<const D: usize>(
     Ok(Solver::new(comm, physics, forest, chunks, Clock::default()))
 }
 
-/// Collective. The particles that come with the stage of this physics, in the own leaves and under their
-/// stress, numbered from `first` on along the curve, so that no number depends on the partition.
-fn new_particles<const D: usize>(
-    comm: &Comm,
-    problem: &Problem<D>,
-    forest: &Forest<D>,
-    physics: &Physics<D>,
-    first: u64,
-) -> Result<Vec<Chunk<D>>, Disagreement> {
-    let stage = physics.stage();
-    let mut chunks = comm.agree(seed(forest, problem, stage))?;
-    let mut id = first + comm.exclusive_sum_u64(chunks.iter().map(|chunk| chunk.len() as u64).sum());
-    for chunk in &mut chunks {
-        for p in 0..chunk.len() {
-            chunk.ids_mut()[p] = id;
-            id += 1;
-            let tag = Tag::unpack(chunk.tags()[p]);
-            let material = stages::material_of(problem, usize::from(tag.body), stage) as u16;
-            chunk.tags_mut()[p] = Tag { material, ..tag }.pack();
-            if problem.bodies[usize::from(tag.body)].given.is_none() {
-                physics.begin_history(chunk, p);
-            }
-        }
-    }
-    let stressed = forest.leaves().par_iter().zip(&mut chunks);
-    let stressed = stressed
-        .map(|(leaf, chunk)| put_under_stress(problem, &physics.materials, leaf, chunk, Which::WithoutHeads));
-    let stressed: Result<(), SeedError> = stressed.collect();
-    comm.agree(check_finite(problem).and(stressed))?;
-    Ok(chunks)
-}
-
 /// Collective. The tree that the job asks for before its criteria are evaluated; level by level, so that
 /// `fits` may refuse it before it is built.
 fn first_forest<const D: usize, R>(
@@ -223,22 +156,4 @@ fn partition_by_seeds<const D: usize>(
     });
     comm.sum_u64(&mut size);
     counted.map(|_| size)
-}
-
-/// Not collective. The particles of the own leaves that come with a stage, ids not yet given.
-fn seed<const D: usize>(
-    forest: &Forest<D>,
-    problem: &Problem<D>,
-    stage: usize,
-) -> Result<Vec<Chunk<D>>, SeedError> {
-    forest
-        .leaves()
-        .par_iter()
-        .map(|leaf| {
-            let mut chunk = Chunk::new();
-            fill_leaf(problem, leaf, stage, &mut chunk)?;
-            Ok(chunk)
-        })
-        .collect::<Result<_, SeedError>>()
-        .and_then(|chunks| check_finite(problem).map(|()| chunks))
 }

@@ -5,7 +5,7 @@
 //! centroid kept, unless it has none. So the particles of a body have its volume and its centroid, whatever
 //! its surface. Bodies whose `sampling` is `fitted` have such particles. All follows from the body and the leaf
 //! alone.
-use super::seed::{lattice_of, spacing};
+use super::lattice::{lattice_of, spacing};
 use crate::geometry::{Aabb, Sampling, Shape, Side};
 use crate::job::problem::{Body, CELLS_PER_LEAF, Problem};
 

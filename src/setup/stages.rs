@@ -1,6 +1,9 @@
 //! Changes by the stages of a run: physics, and the particles that come and go.
 use partition::comm::{Comm, Disagreement};
 
+use super::constant::constant_physics;
+use super::materials::material_of;
+use super::particles::new_particles;
 use super::seed::check_counts;
 use super::walls;
 use crate::adaptivity::Cohesion;
@@ -13,7 +16,7 @@ use crate::solver::{Physics, Solver};
 
 /// Physics of the last of the stages that began at these times, s.
 pub fn physics<const D: usize>(problem: &Problem<D>, starts: &[f64]) -> Physics<D> {
-    let mut physics = super::constant_physics(problem);
+    let mut physics = constant_physics(problem);
     for (stage, &start) in problem.stages.iter().zip(starts) {
         if let Some(gravity) = &stage.gravity {
             physics.gravity = gravity.clone();
@@ -119,12 +122,6 @@ fn density_of_field<const D: usize>(problem: &Problem<D>, physics: &Physics<D>, 
     all.iter().all(|density| *density == first).then_some(first)
 }
 
-/// Material of the particles of a body in a stage.
-pub(super) fn material_of<const D: usize>(problem: &Problem<D>, body: usize, stage: usize) -> usize {
-    let changes = problem.stages[..=stage].iter().flat_map(|stage| &stage.materials);
-    changes.filter(|(of, _)| *of == body).fold(problem.bodies[body].material, |_, (_, material)| *material)
-}
-
 /// Collective. Takes a solver into the next stage of its job: bodies are removed, changed and added. Returns
 /// how many particles come, and how many of them to places where there is material already.
 ///
@@ -139,7 +136,7 @@ pub fn enter_next<const D: usize>(
     starts.push(solver.clock.time);
     let physics = physics(problem, &starts);
     let stage = physics.stage();
-    let mut added = super::new_particles(comm, problem, &solver.forest, &physics, solver.next_root())?;
+    let mut added = new_particles(comm, problem, &solver.forest, &physics, solver.next_root())?;
     let mut counts = vec![0; problem.bodies.len()];
     added.iter().flat_map(Chunk::tags).for_each(|tag| counts[usize::from(Tag::unpack(*tag).body)] += 1);
     comm.sum_u64(&mut counts);

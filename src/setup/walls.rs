@@ -2,7 +2,7 @@
 use crate::boundary::{ActsOn, Collider};
 use crate::geometry::{Aabb, Side};
 use crate::job::Problem;
-use crate::setup::stages::material_of;
+use crate::setup::materials::material_of;
 
 /// Cells below its surface that a wall which acts on nodes has, or it leaks.
 const CELLS: f64 = 2.0;

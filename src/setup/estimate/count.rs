@@ -9,7 +9,7 @@
 //! these make the parents of theirs, and so on; so an octant of level `l` is split just when a region splits
 //! an octant of a level `m ≥ l` that lies within its box grown by `h_l - h_m` on all sides, where `h` are the
 //! edges of octants.
-use super::LevelCount;
+use super::levels::LevelCount;
 use crate::geometry::{Aabb, Shape, Side};
 use crate::grid::mask::{offset, offset_count};
 use crate::job::problem::{Problem, Region};

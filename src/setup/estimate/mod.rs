@@ -1,18 +1,24 @@
 //! Cost of a job, estimated without running it.
+//!
+//! | file | what it holds |
+//! |---|---|
+//! | this | particles, steps, memory and files of a job |
+//! | `count`, `levels` | leaves and particles of its tree, counted without building it; the same by level |
+//! | [`pace`], `coarser` | cost of steps on this machine; that of a job that is too large to be tried |
+//! | `explicit` | the tree leaf by leaf: reference of the tests |
 use self::count::Tally;
+pub use self::levels::LevelCount;
 use self::pace::Pace;
 use super::seed::{SeedError, check_finite};
-use crate::grid::mask::{offset, offset_count};
 use crate::job::problem::{Body, Field, MaterialSetup, Problem};
 use crate::particle::Layout;
 use crate::quantity::Quantity;
 use crate::setup::Size;
-use bytemuck::{Pod, Zeroable};
-use partition::Octant;
-use rustc_hash::FxHashSet;
 use std::path::PathBuf;
 
+mod coarser;
 mod count;
+mod levels;
 pub mod pace;
 
 /// The size and the cost of a job cannot be estimated.
@@ -77,44 +83,6 @@ const BYTES_PER_SECOND: f64 = 3e8;
 
 /// Bytes that each rank takes with next to no particles: the program itself and its libraries.
 pub const PROGRAM: f64 = 37e6;
-
-/// Leaves of one level.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
-#[repr(C)]
-pub struct LevelCount {
-    /// All leaves.
-    pub leaves: u64,
-    /// Leaves with particles.
-    pub filled: u64,
-    /// Those of them that touch a leaf of another level.
-    pub filled_jumps: u64,
-    /// Particles.
-    pub particles: u64,
-}
-
-impl LevelCount {
-    /// Not collective. Counts of some leaves by level up to the finest one, given the particles of each.
-    pub fn of_levels<const D: usize>(
-        problem: &Problem<D>,
-        leaves: &[Octant<D>],
-        particles: &[u64],
-    ) -> Vec<Self> {
-        let all: FxHashSet<Octant<D>> = leaves.iter().copied().collect();
-        let finest = leaves.iter().map(|leaf| leaf.level).max().unwrap_or(0);
-        let mut levels = vec![Self::default(); usize::from(finest) + 1];
-        for (leaf, &particles) in leaves.iter().zip(particles) {
-            let mut around =
-                (0..offset_count(D)).filter_map(|index| leaf.neighbour(offset(index), &problem.brick));
-            let is_jump = particles > 0 && around.any(|neighbour| !all.contains(&neighbour));
-            let level = &mut levels[usize::from(leaf.level)];
-            level.leaves += 1;
-            level.filled += u64::from(particles > 0);
-            level.filled_jumps += u64::from(is_jump);
-            level.particles += particles;
-        }
-        levels
-    }
-}
 
 impl Estimate {
     /// Bytes of memory of each of some ranks that share the work evenly; about.

@@ -1,5 +1,5 @@
 //! Colliders that are unlikely to act as intended.
-use super::NAME;
+use super::name::NAME;
 use crate::boundary::motion::{Motion, Pose};
 use crate::boundary::vector::length;
 use crate::boundary::{ActsOn, Collider, Contact};

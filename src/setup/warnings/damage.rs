@@ -1,5 +1,5 @@
 //! Crack bands that are too wide.
-use super::NAME;
+use super::name::NAME;
 use crate::geometry::{Aabb, Side};
 use crate::job::Problem;
 use crate::material::parameters::Parameters;

@@ -2,10 +2,11 @@
 //! that reaches nothing, points above the ground.
 use serde_json::Value;
 
-use super::{NAME, foot};
+use super::name::NAME;
+use crate::geometry::Aabb;
 use crate::job::Problem;
 use crate::job::problem::MaterialSetup;
-use crate::load::Gravity;
+use crate::load::{Gravity, Up};
 use crate::text::{excerpt, number, place, quantity};
 
 /// Models of ground.
@@ -115,4 +116,9 @@ fn tracks<const D: usize>(problem: &Problem<D>, all: &mut Vec<String>) {
             ));
         }
     }
+}
+
+/// Coordinate (m) of the lowest point of bounds along the vertical.
+pub(super) fn foot<const D: usize>(bounds: &Aabb<D>, up: Up) -> f64 {
+    if up.sign > 0.0 { bounds.lower[up.axis] } else { bounds.upper[up.axis] }
 }

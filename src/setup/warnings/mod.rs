@@ -9,10 +9,11 @@
 //! | `shock.rs` | gas without what its shocks need |
 //! | `stretch.rs` | elastic bodies that are stretched further than particles follow |
 //! | `units.rs` | properties that no matter has |
-use crate::geometry::Aabb;
+//! | `name.rs` | how long a name they quote |
+use self::ground::foot;
+use self::name::NAME;
 use crate::job::Problem;
 use crate::job::problem::{Body, Coordinates};
-use crate::load::Up;
 use crate::material::laws::drucker_prager::FrictionMatch;
 use crate::material::parameters::Parameters;
 use crate::text::{count, excerpt, number};
@@ -20,14 +21,13 @@ use crate::text::{count, excerpt, number};
 mod colliders;
 mod damage;
 mod ground;
+mod name;
 mod shock;
 mod stretch;
 mod units;
 
 /// Steps from which a run is called long.
 const MANY_STEPS: f64 = 1e6;
-/// Longest name that is quoted, in characters.
-const NAME: usize = 60;
 
 /// Not collective. Warnings about a job that takes about this number of steps, each with the key that it is
 /// about.
@@ -86,11 +86,6 @@ fn materials<const D: usize>(problem: &Problem<D>, all: &mut Vec<String>) {
             ));
         }
     }
-}
-
-/// Coordinate (m) of the lowest point of bounds along the vertical.
-fn foot<const D: usize>(bounds: &Aabb<D>, up: Up) -> f64 {
-    if up.sign > 0.0 { bounds.lower[up.axis] } else { bounds.upper[up.axis] }
 }
 
 /// Bodies that reach below the water table, of materials that are no heavier there.

@@ -1,5 +1,5 @@
 //! Gas: settings that its shocks and its expansion need.
-use super::NAME;
+use super::name::NAME;
 use crate::job::Problem;
 use crate::job::problem::BoxPolicy;
 use crate::text::excerpt;

@@ -1,5 +1,5 @@
 //! Elastic bodies that a job stretches further than particles follow.
-use super::NAME;
+use super::name::NAME;
 use crate::boundary::Contact;
 use crate::boundary::vector::length;
 use crate::geometry::{Aabb, common_point};

@@ -1,7 +1,7 @@
 //! Properties that no matter has, or under which it collapses at once: mostly mistaken units.
 use serde_json::Value;
 
-use super::NAME;
+use super::name::NAME;
 use crate::geometry::Aabb;
 use crate::job::Problem;
 use crate::job::problem::{Body, MaterialSetup};
