@@ -1,12 +1,12 @@
 //! Pictures and charts of a page.
 use std::fmt::Write as _;
+use std::path::PathBuf;
 
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD as BASE64;
 
 use super::panels::Panel;
-use super::sections::section;
-use super::{Options, Run};
+use super::run::Run;
 use crate::io::chart::{self, Chart};
 use crate::io::hdf5_file::FileError;
 use crate::io::picture;
@@ -96,4 +96,27 @@ pub(super) fn charts(body: &mut String, id: &str, title: &str, panels: &[Panel])
         section(body, id, title);
         let _ = write!(body, "<div class=\"grid\">\n{drawn}</div>\n");
     }
+}
+
+/// Options of a page.
+#[derive(Clone, Debug)]
+pub struct Options {
+    /// Quantity that colours the pictures, as for `agimp plot`; `None` for plastic strain if there is any,
+    /// else the speed.
+    pub colour: Option<String>,
+    /// Most pictures: times from the first output to the last.
+    pub pictures: usize,
+    /// Job file of the run, beside which the meshes of its colliders lie; `None`: where the run's name leads.
+    pub job: Option<PathBuf>,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Self { colour: None, pictures: 4, job: None }
+    }
+}
+
+/// Begins a section.
+pub(super) fn section(body: &mut String, id: &str, title: &str) {
+    let _ = write!(body, "</section>\n<section id=\"{id}\">\n<h2>{title}</h2>\n");
 }

@@ -2,9 +2,10 @@
 //!
 //! | file | content |
 //! |---|---|
-//! | this | options and assembly of the page |
+//! | this | assembly of the page |
+//! | `run.rs` | content of the files of a run |
 //! | `sections.rs` | its words, numbers and tables |
-//! | `figures.rs` | its pictures and charts |
+//! | `figures.rs` | its pictures and charts, and their options |
 //! | `results.rs` | the files of a run: which are there, and how far it has come |
 //! | `history.rs` | the table of the history |
 //! | `along.rs` | curves along lines of points |
@@ -14,12 +15,11 @@
 //!
 //! Runs that go on, and runs that have ended by a fault, are shown as far as they have come.
 use std::fmt::Write as _;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use crate::io::hdf5_file::FileError;
-use crate::io::snapshot::{self, Header};
 use crate::io::whole_file::write_whole;
-use crate::text::{count, html, quantity};
+use crate::text::html;
 
 mod along;
 mod cost;
@@ -27,35 +27,17 @@ mod figures;
 mod history;
 mod panels;
 mod results;
+mod run;
 mod sections;
 
-use cost::Cost;
+pub use figures::Options;
 use figures::{charts, pictures};
-use history::History;
-use results::State;
 pub use results::{Results, Unclear};
+use run::Run;
 use sections::{collapse, costs, ending, facts, files, job, remarks, table};
 
 const PAGE: &str = include_str!("page.html");
 const STYLE: &str = include_str!("page.css");
-
-/// Options of a page.
-#[derive(Clone, Debug)]
-pub struct Options {
-    /// Quantity that colours the pictures, as for `agimp plot`; `None` for plastic strain if there is any,
-    /// else the speed.
-    pub colour: Option<String>,
-    /// Most pictures: times from the first output to the last.
-    pub pictures: usize,
-    /// Job file of the run, beside which the meshes of its colliders lie; `None`: where the run's name leads.
-    pub job: Option<PathBuf>,
-}
-
-impl Default for Options {
-    fn default() -> Self {
-        Self { colour: None, pictures: 4, job: None }
-    }
-}
 
 /// Not collective. Writes the page of a run. Returns its size in bytes.
 ///
@@ -120,67 +102,6 @@ fn filled(marks: [(&str, &str); 6]) -> String {
         rest = &rest[place + length..];
     }
     page + rest
-}
-
-/// Content of the files of a run.
-struct Run {
-    history: History,
-    cost: Cost,
-    report: Option<crate::run::at_end::report::Report>,
-    state: State,
-    /// Outputs in order of time.
-    outputs: Vec<PathBuf>,
-    /// The header of the last output, and the text of the job in it.
-    header: Option<Header>,
-    job_text: Option<String>,
-    /// The same as a table; empty if there is none.
-    job: toml::Table,
-}
-
-impl Run {
-    fn read(results: &Results) -> Self {
-        let (outputs, report) = (results.outputs(), results.report());
-        // The last one that can be read.
-        let last = outputs.iter().rev().find_map(|output| Some((output, results::header(output)?)));
-        let (last, header) = last.unzip();
-        let job_text = last.and_then(|last| snapshot::job_text(last));
-        Self {
-            history: History::read(&results.path("history.csv")),
-            cost: Cost::read(&results.path("telemetry.jsonl")),
-            state: results.state(report.is_some()),
-            report,
-            header,
-            job: job_text.as_deref().and_then(|text| toml::from_str(text).ok()).unwrap_or_default(),
-            job_text,
-            outputs,
-        }
-    }
-
-    fn title(&self) -> Option<String> {
-        let title = self.job.get("title")?.as_str()?.trim().to_owned();
-        (!title.is_empty()).then_some(title)
-    }
-
-    /// End of the run that the job asks for, s.
-    fn end(&self) -> Option<f64> {
-        let end = self.job.get("time")?.get("end")?;
-        end.as_float().or_else(|| end.as_integer().map(|end| end as f64))
-    }
-
-    /// A class for the style of the page, and a sentence.
-    fn state(&self) -> (&'static str, String) {
-        let time = self.history.last("time").map_or("its start".into(), |time| quantity(time, "s"));
-        let end = self.end().map_or(String::new(), |end| format!(" of {}", quantity(end, "s")));
-        match &self.state {
-            State::Finished => ("finished", format!("finished at {time}")),
-            State::Running(holder) => ("running", format!("running, at {time}{end} ({holder})")),
-            State::Told(ending) => {
-                let (what, at) = if ending.is_stop { ("stopped", "ended") } else { ("failed", "failed") };
-                (at, format!("{what} at {}{end}, step {}", quantity(ending.time, "s"), count(ending.step)))
-            }
-            State::Ended => ("ended", format!("ended without finishing, at {time}{end}")),
-        }
-    }
 }
 
 #[cfg(test)]

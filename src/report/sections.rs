@@ -1,17 +1,12 @@
 //! Sections of a page that are words, numbers and tables.
 use std::fmt::Write as _;
 
-use super::Run;
-use super::figures::charts;
+use super::figures::{charts, section};
 use super::history::History;
 use super::results::{Results, State};
+use super::run::Run;
 use crate::io::snapshot;
 use crate::text::{bytes, count, html, number, quantity, quantity_to, wall_time};
-
-/// Begins a section.
-pub(super) fn section(body: &mut String, id: &str, title: &str) {
-    let _ = write!(body, "</section>\n<section id=\"{id}\">\n<h2>{title}</h2>\n");
-}
 
 /// Summary: time, steps, sizes and cost of the run.
 pub(super) fn facts(body: &mut String, run: &Run) {
