@@ -2,6 +2,7 @@
 //!
 //! | file | what it holds |
 //! |---|---|
+//! | `options.rs` | options of a view |
 //! | `columns.rs` | numbers of the particles in the file, and their ranges over all times |
 //! | `pack.rs` | numbers as few bytes: sorted along a curve, as differences, compressed |
 //! | `meta.rs` | metadata of the page, as JSON |
@@ -18,25 +19,15 @@ use base64::engine::general_purpose::STANDARD as BASE64;
 
 use crate::io::frame::{Frame, Leaves, shown_in};
 use crate::io::hdf5_file::FileError;
-use crate::io::snapshot::PointField;
 
 mod columns;
 mod meta;
+mod options;
 mod pack;
 
 use columns::{Column, LeafMaxima};
 use meta::{FrameMeta, Meta};
-
-/// Options of a view.
-#[derive(Clone, Debug)]
-pub struct Options {
-    /// Title; the page shows it above all.
-    pub title: String,
-    /// Fields; `None` for all but identifiers and components of vectors.
-    pub fields: Option<Vec<PointField>>,
-    /// Bits for a real value, 4 to 16.
-    pub bits: u8,
-}
+pub use options::Options;
 
 /// The page without its data, in three parts: up to the style, up to the data, up to the script.
 const PAGE: &str = include_str!("page/index.html");
