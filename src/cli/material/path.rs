@@ -3,7 +3,7 @@ use std::path::Path;
 
 use serde::Deserialize;
 
-use super::{MaterialError, read};
+use super::error::{MaterialError, read};
 use crate::material::driver::Matrix;
 use crate::material::driver::control::{COMPONENTS, Prescribed, Target};
 

@@ -1,26 +1,9 @@
 //! Tests of the laboratory as paths of strains and stresses.
-use clap::ValueEnum;
-
+use super::arguments::{Arguments, Trial};
+use super::error::MaterialError;
 use super::path::Row;
-use super::{Arguments, MaterialError};
 use crate::material::driver::control::Prescribed::{Strain, Stress};
 use crate::material::driver::control::Target;
-
-/// A test of the laboratory. All begin under the same pressure on all sides.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-#[value(rename_all = "snake_case")]
-pub enum Trial {
-    /// Compression along z, no strain across
-    Oedometer,
-    /// Compression along z, constant stress across
-    Triaxial,
-    /// Compression along z, constant stress along x, no strain along y
-    Biaxial,
-    /// Shear of x over y under a constant stress along y, no strain along x and z
-    SimpleShear,
-    /// The same strain along all axes
-    Isotropic,
-}
 
 /// Rows of a test: the confinement, and `rows` more to the end of the range.
 pub(super) fn rows(test: Trial, args: &Arguments) -> Result<Vec<Row>, MaterialError> {

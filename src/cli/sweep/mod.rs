@@ -8,8 +8,10 @@
 //! | file | content |
 //! |---|---|
 //! | this | combinations of values, one run after the other |
+//! | `one` | arguments, one run and its row of the table |
 //! | `process` | directory and process of a run |
 //! | `table` | `sweep.csv` |
+mod one;
 mod process;
 mod table;
 
@@ -18,12 +20,14 @@ use std::fmt::Write as _;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
+pub(super) use self::one::Arguments;
+use self::one::{Row, Run, finished};
 use self::process::Ended;
 use super::Failure;
 use super::shared::message::warn_of;
 use crate::checksum::fnv1a;
 use crate::job::{self, Settings};
-use crate::run::at_end::report::{self, Report};
+use crate::run::at_end::report;
 use crate::run::claim;
 use crate::run::stop::StopRequest;
 
@@ -31,56 +35,6 @@ use crate::run::stop::StopRequest;
 const MOST_RUNS: usize = 10_000;
 /// Characters of a setting in the name of a directory.
 const NAME: usize = 60;
-
-/// Arguments of `agimp sweep`.
-#[derive(Debug, clap::Args)]
-pub struct Arguments {
-    /// Job file (TOML).
-    job: PathBuf,
-    /// A key of the job, as for --set, and its values, separated by commas; with several keys, each
-    /// combination is run.
-    #[arg(long, value_name = "KEY=A,B,C", required = true)]
-    over: Vec<String>,
-    /// A value for all runs, as for `agimp run`; may be given several times.
-    #[arg(long, value_name = "KEY=VALUE")]
-    set: Vec<String>,
-    /// Columns of the history to print for each run, by the beginning of their names; all are in sweep.csv.
-    #[arg(long, value_name = "COLUMNS", value_delimiter = ',')]
-    show: Vec<String>,
-    /// Directory of the sweep: one directory for each run, and `sweep.csv`; out/NAME.sweep by default.
-    #[arg(long, value_name = "DIR")]
-    out: Option<PathBuf>,
-    /// Words before `agimp run`, such as "mpirun -n 4".
-    #[arg(long, value_name = "WORDS", default_value = "")]
-    launch: String,
-    /// Threads of each rank.
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
-    threads: Option<u16>,
-    /// Start runs again whose directories hold results that they cannot go on from, such as those of another
-    /// job, and replace these.
-    #[arg(long)]
-    overwrite: bool,
-}
-
-/// One run of the sweep.
-struct Run {
-    /// Values in the order of the keys.
-    values: Vec<String>,
-    /// Arguments of `--set`.
-    settings: Vec<String>,
-    directory: PathBuf,
-    /// Expected in its results: digest of the job and end of the run, s.
-    digest: u64,
-    end: f64,
-}
-
-/// One row of the table.
-struct Row<'a> {
-    run: &'a Run,
-    status: &'static str,
-    /// Of a run that has finished.
-    report: Option<Report>,
-}
 
 /// Runs the combinations that are not finished yet, and writes the table.
 ///
@@ -276,13 +230,6 @@ fn directory(over: &[(String, Vec<String>)], values: &[String]) -> String {
         let _ = write!(name, "-{:06x}", fnv1a(whole.bytes().map(u64::from)) & 0xff_ffff);
     }
     name
-}
-
-/// The report of a finished run of this job with these settings; each has the last row of its history.
-fn finished(path: &Path, run: &Run) -> Option<Report> {
-    let report: Report = serde_json::from_slice(&std::fs::read(path).ok()?).ok()?;
-    let is_of_run = report.digest == report::digest(run.digest) && report.end == run.end;
-    (is_of_run && !report.history.is_empty()).then_some(report)
 }
 
 #[cfg(test)]

@@ -6,7 +6,8 @@ use std::time::Duration;
 
 use rustix::process::{Pid, Signal, kill_process};
 
-use super::{Arguments, Failure, Run, finished};
+use super::one::{Arguments, Run, finished};
+use crate::cli::Failure;
 use crate::io::hdf5_file::FileError;
 use crate::io::snapshot::directory::{AtStake, at_stake, candidates};
 use crate::run::at_end::report;

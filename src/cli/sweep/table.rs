@@ -2,7 +2,8 @@
 use std::fmt::Write as _;
 use std::path::Path;
 
-use super::{Failure, Row};
+use super::one::Row;
+use crate::cli::Failure;
 use crate::io::whole_file::write_whole;
 use crate::text::excerpt;
 
