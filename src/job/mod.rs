@@ -9,13 +9,13 @@ pub mod problem;
 pub mod schema;
 
 pub use difference::{Difference, differences};
+pub use parse::bytes::read;
 pub use parse::error::{Fault, FaultList, JobError, Position};
-pub use parse::include::Included;
+pub use parse::included::Included;
 pub use parse::settings::Settings;
 pub use problem::{AnyProblem, Problem};
 pub use schema::json::schema;
 
-use std::io::Read as _;
 use std::path::Path;
 use std::sync::LazyLock;
 
@@ -38,23 +38,6 @@ pub fn load(path: &Path) -> Result<AnyProblem, JobError> {
 /// The same; also a setting may be at fault.
 pub fn load_with(path: &Path, settings: &Settings) -> Result<AnyProblem, JobError> {
     from_bytes(read(path)?, path, settings)
-}
-
-/// Longest job file, bytes. Reading it takes up to a hundred times as much memory.
-const MOST_BYTES: u64 = 2_000_000;
-
-/// The bytes of a job file. Not collective.
-///
-/// # Errors
-/// The file cannot be read, or is too long.
-pub fn read(path: &Path) -> Result<Vec<u8>, JobError> {
-    let mut bytes = Vec::new();
-    let read = std::fs::File::open(path).and_then(|file| file.take(MOST_BYTES + 1).read_to_end(&mut bytes));
-    read.map_err(|source| JobError::Unreadable { path: path.to_path_buf(), source })?;
-    if bytes.len() as u64 > MOST_BYTES {
-        return Err(JobError::TooLong { path: path.to_path_buf(), most: MOST_BYTES / 1_000_000 });
-    }
-    Ok(bytes)
 }
 
 /// Checks the bytes of a job file, with some values set from outside. Nothing is read from `path`: its stem

@@ -170,3 +170,24 @@ impl<const D: usize> Space<D> {
         format!("[{}]", components.join(", "))
     }
 }
+
+/// Faults for names that are empty or taken.
+pub(super) fn check_names<'a>(checks: &mut Checks, names: impl Iterator<Item = &'a str>, path: &Path) {
+    let mut seen = rustc_hash::FxHashSet::default();
+    let mut count = 0;
+    for (i, name) in names.enumerate() {
+        count += 1;
+        let here = path.index(i).key("name");
+        if name.trim().is_empty() {
+            checks.fault(&here, "found an empty name; expected at least one letter".into());
+        } else if !seen.insert(name) {
+            let name = excerpt(name, QUOTED);
+            checks.fault(&here, format!("found \"{name}\" a second time; expected a name that is not taken"));
+        }
+    }
+    if count == 0 {
+        checks.fault(path, "found an empty array; expected at least one element".into());
+    } else if count > usize::from(u16::MAX) {
+        checks.fault(path, format!("found {count} elements; expected at most {}", u16::MAX));
+    }
+}

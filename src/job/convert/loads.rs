@@ -5,7 +5,7 @@ use crate::geometry::written::Vector;
 use crate::job::parse::source::Path;
 use crate::job::schema::job_file::JobFile;
 use crate::job::schema::loads::{Load as Written, LoadKind, Sharing};
-use crate::load::{Carried, CarriedForce, Kind, Load};
+use crate::load::{Carried, CarriedForce, Gravity, Kind, Load};
 use crate::quantity::Quantity;
 use crate::text::written as number;
 
@@ -144,4 +144,18 @@ fn direction<const D: usize>(
         Some(vector) => checks.direction(vector, path).map(Some),
         None => Some(None),
     }
+}
+
+/// Gravity is the same everywhere.
+pub(super) fn gravity<const D: usize>(
+    checks: &mut Checks,
+    written: &[crate::job::schema::loads::Quantity],
+    path: &Path,
+) -> Option<Gravity<D>> {
+    let components = vector::<D>(checks, written, path)?;
+    for (axis, _) in components.iter().enumerate().filter(|(_, component)| component.depends_on_place()) {
+        let message = "found an expression of position; expected one of t only (a load of kind \"body_force\" may depend on x, y, z)";
+        checks.fault(&path.index(axis), message.into());
+    }
+    Some(Gravity { acceleration: components, start: 0.0 })
 }

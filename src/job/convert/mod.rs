@@ -3,6 +3,8 @@
 //!
 //! | file | subject |
 //! |---|---|
+//! | `materials` | materials, and what becomes of failed particles |
+//! | `bodies` | bodies |
 //! | `checks` | state that all share: faults with their places, the domain |
 //! | `quasi_static` | load steps, and what jobs with them cannot have |
 //! | `settings` | faces, numerics, output, report |
@@ -11,7 +13,6 @@
 //! | `axisymmetry` | what axisymmetric jobs cannot have |
 //! | `colliders` | colliders and their motion |
 //! | `contact` | contact between bodies |
-//! | `failed` | what becomes of failed particles |
 //! | `loads` | loads and quantities |
 //! | `probes` | probes, tracks, fluxes, lines and maps |
 //! | `sources` | sources |
@@ -20,38 +21,34 @@
 //! | `overlap` | whether bodies overlap |
 //! | `water` | water in the pores |
 use self::adaptivity::{Context, adaptivity};
+use self::bodies::bodies;
 use self::checks::{Checks, Space};
 use self::colliders::colliders;
 use self::contact::body_contacts;
-use self::loads::loads;
-use self::quantities::vector;
+use self::loads::{gravity, loads};
+use self::materials::materials;
 use self::settings::{digest, faces, numerics, output, report};
 use super::parse::error::{Fault, Position, QUOTED};
 use super::parse::source::{Node, Path};
 use super::problem::*;
-use super::schema::common::FASTEST;
 use super::schema::job_file::{self as file, JobFile};
-use crate::geometry::written::{Shape as Written, Vector};
-use crate::geometry::{Aabb, Sampling, Shape};
+use crate::geometry::Aabb;
+use crate::geometry::written::Vector;
 use crate::load::{Gravity, Load};
-use crate::material::Failed;
-use crate::material::laws::flow::explosive;
-use crate::material::parameters::{OutOfRange, Parameters};
-use crate::material::undrained::Undrained;
 use crate::particle::followed::Motion;
-use crate::quantity::{AXES, Quantity};
+use crate::quantity::AXES;
 use crate::solver::Ties;
 use crate::text::{excerpt, number, written};
 use partition::{Brick, key::MAX_ROOTS};
-use rustc_hash::FxHashMap;
 
 mod adaptivity;
 mod axisymmetry;
+mod bodies;
 mod checks;
 mod colliders;
 mod contact;
-mod failed;
 mod loads;
+mod materials;
 mod overlap;
 mod probes;
 mod quantities;
@@ -269,20 +266,6 @@ fn problem<const D: usize>(
     Some(problem)
 }
 
-/// Gravity is the same everywhere.
-pub(super) fn gravity<const D: usize>(
-    checks: &mut Checks,
-    written: &[file::Quantity],
-    path: &Path,
-) -> Option<Gravity<D>> {
-    let components = vector::<D>(checks, written, path)?;
-    for (axis, _) in components.iter().enumerate().filter(|(_, component)| component.depends_on_place()) {
-        let message = "found an expression of position; expected one of t only (a load of kind \"body_force\" may depend on x, y, z)";
-        checks.fault(&path.index(axis), message.into());
-    }
-    Some(Gravity { acceleration: components, start: 0.0 })
-}
-
 fn domain<const D: usize>(
     checks: &mut Checks,
     domain: &file::Domain,
@@ -367,274 +350,4 @@ fn tree<const D: usize>(
         graded: tree.graded,
         regions,
     })
-}
-
-/// Faults for names that are empty or taken.
-fn names<'a>(checks: &mut Checks, names: impl Iterator<Item = &'a str>, path: &Path) {
-    let mut seen = rustc_hash::FxHashSet::default();
-    let mut count = 0;
-    for (i, name) in names.enumerate() {
-        count += 1;
-        let here = path.index(i).key("name");
-        if name.trim().is_empty() {
-            checks.fault(&here, "found an empty name; expected at least one letter".into());
-        } else if !seen.insert(name) {
-            let name = excerpt(name, QUOTED);
-            checks.fault(&here, format!("found \"{name}\" a second time; expected a name that is not taken"));
-        }
-    }
-    if count == 0 {
-        checks.fault(path, "found an empty array; expected at least one element".into());
-    } else if count > usize::from(u16::MAX) {
-        checks.fault(path, format!("found {count} elements; expected at most {}", u16::MAX));
-    }
-}
-
-fn materials(
-    checks: &mut Checks,
-    materials: &[file::Material],
-    dimension: usize,
-    path: &Path,
-) -> Vec<MaterialSetup> {
-    names(checks, materials.iter().map(|material| material.name.as_str()), path);
-    for (i, material) in materials.iter().enumerate() {
-        if let Err(OutOfRange { key, value, range }) = material.model.check() {
-            let own = key.split('.').fold(path.index(i), |path, key| path.key(key.to_owned()));
-            checks.fault(&own, format!("found {value}; expected a number {range}"));
-        } else if let Some(water) = &material.undrained {
-            undrained(checks, water, &material.model, &path.index(i));
-        }
-        if let Parameters::Explosive(own) = &material.model {
-            ignition(checks, own, dimension, &path.index(i).key("ignition"));
-        }
-        if let Some(factor) = material.strength_factor
-            && material.model.weakened(factor).is_none()
-        {
-            let message = "found it for a model without cohesion, yield stress or friction; expected mohr_coulomb, drucker_prager, tresca or von_mises";
-            checks.fault(&path.index(i).key("strength_factor"), message.into());
-        }
-    }
-    (0..)
-        .zip(materials)
-        .map(|(i, material)| {
-            let failed = failed::failed(checks, material, materials, &path.index(i).key("failed"));
-            MaterialSetup { failed, ..material_setup(material) }
-        })
-        .collect()
-}
-
-/// Faults of the points from which an explosive burns.
-fn ignition(checks: &mut Checks, own: &explosive::Parameters, dimension: usize, path: &Path) {
-    for (number, ignition) in own.ignition.iter().enumerate() {
-        if ignition.point.0.len() != dimension {
-            let message = format!(
-                "found {} coordinates; expected {dimension}, as many as the job has dimensions",
-                ignition.point.0.len()
-            );
-            checks.fault(&path.index(number).key("point"), message);
-        }
-    }
-}
-
-/// Faults of water in the pores of a material.
-fn undrained(checks: &mut Checks, water: &Undrained, model: &Parameters, path: &Path) {
-    if let Err(OutOfRange { key, value, range }) = water.check() {
-        let own = key.split('.').fold(path.clone(), |path, key| path.key(key.to_owned()));
-        checks.fault(&own, format!("found {value}; expected a number {range}"));
-    } else if let Err(reason) = Undrained::check_model(model) {
-        checks.fault(&path.key("undrained"), reason.to_owned());
-    }
-}
-
-fn material_setup(material: &file::Material) -> MaterialSetup {
-    let weakened = material.strength_factor.and_then(|factor| material.model.weakened(factor));
-    MaterialSetup {
-        name: material.name.clone(),
-        density: material.density,
-        saturated_density: material.saturated_density.unwrap_or(material.density),
-        model: weakened.unwrap_or_else(|| material.model.clone()),
-        undrained: material.undrained,
-        failed: Failed::Stays,
-    }
-}
-
-fn bodies<const D: usize>(
-    checks: &mut Checks,
-    file: &JobFile,
-    space: &Space<D>,
-    path: &Path,
-) -> Option<Vec<Body<D>>> {
-    if file.sources.is_empty() || !file.bodies.is_empty() {
-        names(checks, file.bodies.iter().map(|body| body.name.as_str()), path);
-    }
-    // Of equal names the first counts, as elsewhere.
-    let mut numbers = FxHashMap::default();
-    for (number, material) in file.materials.iter().enumerate() {
-        numbers.entry(material.name.as_str()).or_insert(number);
-    }
-    let bodies: Vec<Body<D>> = (file.bodies.iter().enumerate())
-        .map_while(|(i, body)| {
-            (!checks.is_full()).then(|| self::body(checks, body, &numbers, file, space, &path.index(i)))
-        })
-        .flatten()
-        .collect();
-    (bodies.len() == file.bodies.len()).then_some(bodies)
-}
-
-fn body<const D: usize>(
-    checks: &mut Checks,
-    body: &file::Body,
-    materials: &FxHashMap<&str, usize>,
-    file_of: &JobFile,
-    space: &Space<D>,
-    path: &Path,
-) -> Option<Body<D>> {
-    let material = materials.get(body.material.as_str()).copied();
-    if material.is_none() {
-        let known = || file_of.materials.iter().map(|material| material.name.as_str());
-        checks.unknown(&body.material, "material", known, &path.key("material"));
-    }
-    let velocity = match &body.velocity {
-        Some(velocity) => stress::fields(checks, velocity, &path.key("velocity"), FASTEST),
-        None => Some(std::array::from_fn(|_| Quantity::default())),
-    };
-    let angular_velocity = match (&body.angular_velocity, D) {
-        (None, _) => Some([0.0; 3]),
-        (Some(file::Spin::Plane(spin)), 2) => Some([0.0, 0.0, *spin]),
-        (Some(file::Spin::Space(spin)), 3) => Some(*spin),
-        (Some(given), _) => {
-            let (found, expected) = match given {
-                file::Spin::Plane(_) => ("a number", "an array of 3 components in a 3D job"),
-                file::Spin::Space(_) => ("an array", "a number (about z) in a 2D job"),
-            };
-            checks.fault(&path.key("angular_velocity"), format!("found {found}; expected {expected}"));
-            None
-        }
-    };
-    let here = path.key("shape");
-    let given = match &body.shape {
-        Written::Particles { file } => {
-            if body.stress.is_some() {
-                let message =
-                    "found a stress; expected none with particles from a file, which contains their stress";
-                checks.fault(&path.key("stress"), message.into());
-            }
-            let setup = material_setup(&file_of.materials[material?]);
-            Some(checks.particles(file, &body.name, &setup, space, &here.key("file"))?)
-        }
-        _ => None,
-    };
-    let shape: Shape<D> = match &given {
-        Some(given) => Shape::Box(given.bounds().intersection(&Aabb::new([0.0; D], space.size))),
-        None => checks.shape(&body.shape, space, &here)?,
-    };
-    let bounds = shape.bounds();
-    if bounds.is_empty() {
-        checks.fault(&here, "found a shape without a point; expected one with a volume".into());
-        return None;
-    }
-    for a in 0..D {
-        // Lengths in the file are decimal; a face on the domain's may be a few roundings off.
-        let slack = 1e-9 * space.size[a] + 8.0 * f64::EPSILON * space.origin[a].abs();
-        let (low, high) = (bounds.lower[a], bounds.upper[a]);
-        // A plane of symmetry cuts bodies that continue beyond it; particles from a file may not lie there.
-        let is_cut = |side: usize| given.is_none() && is_symmetric(&file_of.boundaries, a, side);
-        let below = low.is_finite() && low < -slack && !is_cut(0);
-        let above = high.is_finite() && high > space.size[a] + slack && !is_cut(1);
-        if below || above || low >= space.size[a] || high <= 0.0 {
-            let (o, low_inside, high_inside) = (space.origin[a], low, high);
-            let [low, high, least, most] = [low + o, high + o, o, o + space.size[a]].map(|x| number(x, 7));
-            let (name, axis) = (excerpt(&body.name, QUOTED), AXES[a]);
-            let side = if below { "min" } else { "max" };
-            // What it needs, in whole roots, counted from the lower corner.
-            let root = file_of.domain.root_edge;
-            let needed = root * (bounds.upper[a] / root - 1e-9).ceil();
-            let grown = match bounds.lower[a] > -slack && needed > space.size[a] {
-                true => format!("; domain.size = {} along {axis} would hold it", number(needed, 7)),
-                false => String::new(),
-            };
-            let lies_inside = low_inside < space.size[a] && high_inside > 0.0;
-            let hint = match (below || above) && lies_inside && given.is_none() {
-                true => {
-                    format!(
-                        "{grown}; boundaries.{axis}_{side} = {{ kind = \"symmetric\" }} would cut it there"
-                    )
-                }
-                false => grown,
-            };
-            checks.fault(
-                &here,
-                format!(
-                    "found the body \"{name}\" from {axis} = {low} to {high}; expected it inside the domain, from {axis} = {least} to {most}{hint}"
-                ),
-            );
-            return None;
-        }
-    }
-    Some(Body {
-        name: body.name.clone(),
-        place: (checks.position)(checks.tree.locate(&here).start),
-        centre: bounds.intersection(&Aabb::new([0.0; D], space.size)).centre(),
-        shape,
-        material: material?,
-        velocity: velocity?,
-        angular_velocity: angular_velocity?,
-        stage: stages::of_body(checks, body, file_of, path),
-        particles_per_cell: body.particles_per_cell,
-        sampling: sampling(checks, body, path)?,
-        given,
-        fed: None,
-        stress: match &body.stress {
-            Some(written) => {
-                let here = path.key("stress");
-                Some(stress::stress::<D>(checks, written, file_of, &file_of.materials[material?], &here)?)
-            }
-            None => None,
-        },
-    })
-}
-
-/// The condition on a face of the domain, where the job names one.
-fn face(boundaries: &file::Boundaries, axis: usize, side: usize) -> Option<&file::Face> {
-    let file::Boundaries { x_min, x_max, y_min, y_max, z_min, z_max, .. } = boundaries;
-    [[x_min, x_max], [y_min, y_max], [z_min, z_max]][axis][side].as_ref()
-}
-
-/// Whether a face of the domain is a plane of symmetry.
-fn is_symmetric(boundaries: &file::Boundaries, axis: usize, side: usize) -> bool {
-    matches!(face(boundaries, axis, side), Some(file::Face::Symmetric {}))
-}
-
-/// Whether material leaves through a face of the domain.
-fn is_outflow(boundaries: &file::Boundaries, axis: usize, side: usize) -> bool {
-    matches!(face(boundaries, axis, side), Some(file::Face::Outflow {}))
-}
-
-/// Arrangement of the particles of a body.
-fn sampling<const D: usize>(checks: &mut Checks, body: &file::Body, path: &Path) -> Option<Sampling<D>> {
-    let is_random = matches!(body.sampling, Some(file::Sampling::Jittered | file::Sampling::Poisson));
-    if body.seed.is_some() && !is_random {
-        let message =
-            "found a seed without random places; expected sampling = \"poisson\" or \"jittered\" beside it";
-        checks.fault(&path.key("seed"), message.into());
-        return None;
-    }
-    let seed = u64::from(body.seed.unwrap_or(0));
-    match body.sampling {
-        None | Some(file::Sampling::Lattice) => Some(Sampling::Lattice),
-        Some(file::Sampling::Fitted) => Some(Sampling::Fitted),
-        Some(file::Sampling::Jittered) => Some(Sampling::Jittered(seed)),
-        Some(file::Sampling::Poisson) => {
-            let along_leaf = f64::from(CELLS_PER_LEAF) * body.particles_per_cell;
-            if along_leaf.fract() != 0.0 {
-                let message = format!(
-                    "found {} with sampling = \"poisson\"; expected a multiple of 0.25, for a whole number of particles along the edge of a leaf",
-                    written(body.particles_per_cell)
-                );
-                checks.fault(&path.key("particles_per_cell"), message);
-                return None;
-            }
-            Some(Sampling::poisson(along_leaf as usize, seed))
-        }
-    }
 }

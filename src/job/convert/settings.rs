@@ -253,3 +253,19 @@ pub(in crate::job) fn digest(file: &JobFile) -> u64 {
     let text = serde_json::to_string(&state).unwrap_or_else(|_| format!("{state:?}"));
     fnv1a(text.bytes().map(u64::from))
 }
+
+/// The condition on a face of the domain, where the job names one.
+pub(super) fn face(boundaries: &file::Boundaries, axis: usize, side: usize) -> Option<&file::Face> {
+    let file::Boundaries { x_min, x_max, y_min, y_max, z_min, z_max, .. } = boundaries;
+    [[x_min, x_max], [y_min, y_max], [z_min, z_max]][axis][side].as_ref()
+}
+
+/// Whether a face of the domain is a plane of symmetry.
+pub(super) fn is_symmetric(boundaries: &file::Boundaries, axis: usize, side: usize) -> bool {
+    matches!(face(boundaries, axis, side), Some(file::Face::Symmetric {}))
+}
+
+/// Whether material leaves through a face of the domain.
+pub(super) fn is_outflow(boundaries: &file::Boundaries, axis: usize, side: usize) -> bool {
+    matches!(face(boundaries, axis, side), Some(file::Face::Outflow {}))
+}

@@ -1,5 +1,7 @@
 //! Sources of the job file, and the bodies that they feed.
+use super::bodies::body;
 use super::checks::{Checks, Space};
+use super::settings::is_outflow;
 use crate::geometry::written::Shape as Written;
 use crate::geometry::{Aabb, Side};
 use crate::job::parse::source::Path;
@@ -94,7 +96,7 @@ fn source<const D: usize>(
         let message = "found an explosive with `ignition`, which counts from where particles are at the start; expected another material, or the explosive as a body";
         checks.fault(&path.key("material"), message.into());
     }
-    let body = super::body(checks, &as_body, &materials, file, space, path)?;
+    let body = body(checks, &as_body, &materials, file, space, path)?;
     let velocity = velocity?;
     let domain = Aabb::new([0.0; D], space.size);
     let bounds = body.shape.bounds().intersection(&domain);
@@ -121,7 +123,7 @@ fn source<const D: usize>(
     let axis = Source::main_axis(&velocity);
     let side = usize::from(velocity[axis] > 0.0);
     let way = [bounds.lower[axis], space.size[axis] - bounds.upper[axis]][side];
-    if way < 0.5 * spacing && !super::is_outflow(&file.boundaries, axis, side) {
+    if way < 0.5 * spacing && !is_outflow(&file.boundaries, axis, side) {
         let face = FACES[axis][side];
         let message = format!(
             "found a velocity that leads into the face {face}, where the shape ends; expected one that leads into the domain, or a face of kind `outflow`"

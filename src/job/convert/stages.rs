@@ -1,6 +1,6 @@
 //! Stages of the run.
 use super::checks::Checks;
-use super::settings;
+use super::{loads, settings};
 use crate::job::parse::error::QUOTED;
 use crate::job::parse::source::Path;
 use crate::job::problem::{InStages, Stage};
@@ -95,7 +95,7 @@ fn stage<const D: usize>(checks: &mut Checks, file: &JobFile, index: usize, path
         materials.push((body?, material?));
     }
     let gravity = match &written.gravity {
-        Some(gravity) => Some(super::gravity(checks, gravity, &path.key("gravity"))?),
+        Some(gravity) => Some(loads::gravity(checks, gravity, &path.key("gravity"))?),
         None => None,
     };
     let boundaries = written.boundaries.clone().unwrap_or_default();

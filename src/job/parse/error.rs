@@ -4,7 +4,7 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use super::include::Included;
+use super::included::Included;
 use crate::text::{excerpt, printable};
 
 /// A place in a file of a job, as messages name it: `FILE:LINE:COLUMN`, both from 1.

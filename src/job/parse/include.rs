@@ -8,7 +8,9 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use super::bytes::{self, MOST_BYTES};
 use super::error::{Fault, Lines, Position, QUOTED};
+use super::included::Included;
 use super::source::{Node, Value};
 use crate::text::excerpt;
 
@@ -16,15 +18,6 @@ use crate::text::excerpt;
 const KEY: &str = "include";
 /// Most files that a job may include, with those that they include.
 const MOST: usize = 64;
-
-/// A file that is a part of a job.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Included {
-    /// As messages name it.
-    pub path: PathBuf,
-    /// Its text.
-    pub text: String,
-}
 
 /// The text of a job with all that it includes.
 #[derive(Debug)]
@@ -228,7 +221,7 @@ impl Reader {
                 "found \"{shown}\", which is not a regular file; expected a TOML file"
             )));
         }
-        let bytes = crate::job::read(&path).map_err(|error| {
+        let bytes = bytes::read(&path).map_err(|error| {
             refuse(format!("found \"{shown}\", which cannot be included: {error}; expected a TOML file, its name relative to that of this file"))
         })?;
         let true_name = path.canonicalize().unwrap_or_else(|_| path.clone());
@@ -243,8 +236,8 @@ impl Reader {
             )));
         }
         self.bytes += bytes.len();
-        if self.sources.len() > MOST || self.bytes as u64 > crate::job::MOST_BYTES {
-            let most = crate::job::MOST_BYTES / 1_000_000;
+        if self.sources.len() > MOST || self.bytes as u64 > MOST_BYTES {
+            let most = MOST_BYTES / 1_000_000;
             return Err(refuse(format!(
                 "found too much; expected at most {MOST} files, with the job at most {most} MB"
             )));

@@ -43,3 +43,7 @@ pub(super) fn is_off(flag: &bool) -> bool {
 pub(super) fn yes() -> bool {
     true
 }
+
+pub(super) fn two() -> f64 {
+    2.0
+}

@@ -2,10 +2,12 @@
 //!
 //! The comments here are the descriptions in the schema and in error messages, so each says its unit.
 pub use super::adaptivity::Adaptivity;
+pub use super::boundaries::{Boundaries, Face, Leaving};
 pub use super::colliders::Collider;
-use super::common::yes;
 pub use super::common::{AxisName, Spin};
+use super::common::{two, yes};
 pub use super::contact::BodyContact;
+pub use super::equilibrium::Equilibrium;
 pub use super::loads::{Load, Quantity};
 pub use super::output::{Checkpoint, History, Output, Report, Telemetry};
 pub use super::probes::{Flux, Line, Map, Probe, Track};
@@ -173,95 +175,6 @@ pub struct Domain {
     pub root_edge: f64,
 }
 
-/// Conditions on the faces of the domain. By default a face is `separating` without friction.
-#[derive(Clone, Debug, Default, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct Boundaries {
-    /// Lower face along x.
-    #[serde(default)]
-    pub x_min: Option<Face>,
-    /// Upper face along x.
-    #[serde(default)]
-    pub x_max: Option<Face>,
-    /// Lower face along y.
-    #[serde(default)]
-    pub y_min: Option<Face>,
-    /// Upper face along y.
-    #[serde(default)]
-    pub y_max: Option<Face>,
-    /// Lower face along z; 3D only.
-    #[serde(default)]
-    #[schemars(extend("x-dimension" = 3))]
-    pub z_min: Option<Face>,
-    /// Upper face along z; 3D only.
-    #[serde(default)]
-    #[schemars(extend("x-dimension" = 3))]
-    pub z_max: Option<Face>,
-    /// What happens to particles that leave the domain through a face of another kind than `outflow`; an error by default. Particles that
-    /// cross a face only by rounding are always put back and counted.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub leaving: Option<Leaving>,
-}
-
-/// Condition on a face of the domain.
-#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
-#[serde(tag = "kind", rename_all = "snake_case", deny_unknown_fields)]
-pub enum Face {
-    /// No velocity on the face.
-    Sticky {},
-    /// No velocity through the face, no friction.
-    Slip {},
-    /// Material may leave the face; Coulomb friction acts while it presses, cohesion and turbulent friction while it touches.
-    Separating {
-        /// Friction coefficient, the tangent of the friction angle; 0 by default.
-        #[serde(default)]
-        #[schemars(range(min = 0.0, max = 100.0))]
-        friction: f64,
-        /// Shear stress that holds without pressure where material touches, Pa; 0 by default.
-        #[serde(default)]
-        #[schemars(range(min = 0.0, max = 1e15))]
-        cohesion: f64,
-        /// Voellmy's coefficient ξ of turbulent friction, m/s²: a shear stress of `ρ g v² / ξ` more, with the density ρ and the
-        /// velocity v of the material at the surface and g = 9.80665 m/s². Snow has 400 to 4000; none by default.
-        #[schemars(range(min = 1e-3, max = 1e12))]
-        turbulent_friction: Option<f64>,
-    },
-    /// A plane of symmetry.
-    Symmetric {},
-    /// An open boundary: no condition on velocities. Particles that cross it leave the run, whatever `leaving` says, and are counted with
-    /// their mass.
-    Outflow {},
-    /// Waves go out, as if the material went on: dashpots in proportion to the velocity (Lysmer and Kuhlemeyer). Alone they
-    /// creep under a lasting stress, so `pressure` holds the material at rest.
-    Absorbing {
-        /// Speed of compression waves, m/s.
-        #[schemars(range(max = 1e6), extend("exclusiveMinimum" = 0.0))]
-        p_speed: f64,
-        /// Speed of shear waves, m/s.
-        #[schemars(range(min = 0.0, max = 1e6))]
-        s_speed: f64,
-        /// Density of the material at the face, kg/m³.
-        #[schemars(range(min = 1e-6, max = 1e5))]
-        density: f64,
-        /// Pressure from beyond the face, Pa: a number, an expression in x, y, z and t, or a table over time; none by default.
-        #[serde(default)]
-        pressure: Quantity,
-    },
-}
-
-/// What happens to particles that leave the domain.
-#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum Leaving {
-    /// The run ends with an error that names them.
-    #[default]
-    Error,
-    /// They are deleted and counted.
-    Delete,
-    /// They are moved back to the face and counted.
-    Clamp,
-}
-
 /// Levels of the tree.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -405,10 +318,6 @@ pub enum Sampling {
     Poisson,
 }
 
-pub(super) fn two() -> f64 {
-    2.0
-}
-
 /// End of the run and time step.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -436,25 +345,6 @@ fn default_cfl() -> f64 {
 
 fn default_growth() -> f64 {
     1.1
-}
-
-/// The way to equilibrium, by kinetic damping: whenever the kinetic energy has passed a peak, all velocities are set to 0. The run ends at
-/// rest, once both bounds hold, or at `time.end`. Columns of `history.csv` show the last peak, the last unbalanced force, and how often
-/// velocities were set to 0.
-#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct Equilibrium {
-    /// Bound on the root mean square of the velocities at a peak of the kinetic energy, m/s; 1e-6 of the wave speed is small.
-    #[schemars(range(max = 1e8), extend("exclusiveMinimum" = 0.0))]
-    pub speed: f64,
-    /// Bound on the root mean square of the unbalanced force per mass, m/s²; 1e-4 of gravity is small.
-    #[schemars(range(max = 1e12), extend("exclusiveMinimum" = 0.0))]
-    pub acceleration: f64,
-    /// Whether the material of fine cells moves with more mass than it has, fourfold for each level above `tree.base_level`, so that the
-    /// coarsest cells set the time step. Weight and all other forces are those of its own mass, so the equilibrium is the
-    /// same; the motion before it is not physical.
-    #[serde(default)]
-    pub mass_scaling: bool,
 }
 
 /// Load steps: at the end of each, the forces on all nodes balance (Newton's method). Velocities are 0, and the time of the job orders

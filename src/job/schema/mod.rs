@@ -3,14 +3,16 @@
 //! | file | what it holds |
 //! |---|---|
 //! | [`job_file`] | the file and its tables |
-//! | [`adaptivity`], [`colliders`], [`contact`], [`loads`], [`output`], [`probes`], [`sources`], [`stages`], [`stress`], [`water`] | tables of a part of the file |
+//! | [`adaptivity`], [`boundaries`], [`colliders`], [`contact`], [`equilibrium`], [`loads`], [`output`], [`probes`], [`sources`], [`stages`], [`stress`], [`water`] | tables of a part of the file |
 //! | [`common`] | what several tables have |
 //! | `json` | the JSON schema |
 //! | [`reference`](mod@reference) | the reference in Markdown |
 pub mod adaptivity;
+pub mod boundaries;
 pub mod colliders;
 pub mod common;
 pub mod contact;
+pub mod equilibrium;
 pub mod job_file;
 pub(super) mod json;
 pub mod loads;

@@ -1,5 +1,5 @@
 //! Sources as they are written in a job file.
-use super::job_file::two;
+use super::common::two;
 use crate::geometry::written::{Shape, Vector};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

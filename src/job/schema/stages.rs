@@ -1,5 +1,7 @@
 //! Stages of a run as they are written in a job file.
-use super::job_file::{Boundaries, Equilibrium, Quantity};
+use super::boundaries::Boundaries;
+use super::equilibrium::Equilibrium;
+use super::loads::Quantity;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

@@ -2,10 +2,11 @@
 use std::cell::OnceCell;
 
 use super::super::checks::Checks;
-use super::{Z, allowed, optional, records};
+use super::keys::{Z, allowed, optional};
+use super::records;
 use crate::boundary::motion::{Free, Rate, Table};
-use crate::boundary::vector::length;
 use crate::boundary::rigid::{Meeting, turning};
+use crate::boundary::vector::length;
 use crate::geometry::{Moments, Shape};
 use crate::job::parse::source::Path;
 use crate::job::schema::colliders::{Inertia, Motion as Written};

@@ -8,25 +8,24 @@
 //! | this | the others, and their motion |
 mod deforming;
 mod free_bodies;
+mod keys;
 mod records;
 
 use self::free_bodies::free_body;
+use self::keys::{Z, optional};
 use super::checks::{Checks, Space};
 use crate::boundary::motion::{Motion, Rate, Table};
 use crate::boundary::{ActsOn, Collider, Contact};
-use crate::geometry::written::Vector;
 use crate::geometry::{Aabb, Shape, common_point};
 use crate::job::parse::source::Path;
 use crate::job::schema::colliders::{ActsOn as WrittenActsOn, Contact as WrittenContact, Motion as Written};
-use crate::job::schema::common::{AxisName, Spin};
+use crate::job::schema::common::Spin;
 use crate::job::schema::job_file as file;
 
 /// Most colliders of a job: the header of a checkpoint has limited room.
 const MAX_COLLIDERS: usize = 16;
 /// Most boxes in which a point of a shape is searched.
 const MOST_BOXES: usize = 10_000;
-/// The axis of rotations in a plane.
-const Z: [f64; 3] = [0.0, 0.0, 1.0];
 
 /// All colliders, or faults.
 pub(in crate::job) fn colliders<const D: usize>(
@@ -185,34 +184,4 @@ fn motion<const D: usize>(
         // With the shape: see `free_body`.
         Some(Written::Free { .. }) => None,
     }
-}
-
-/// A vector, or 0 where none is given.
-fn optional<const D: usize>(checks: &mut Checks, vector: Option<&Vector>, path: &Path) -> Option<[f64; D]> {
-    vector.map_or(Some([0.0; D]), |vector| checks.vector(vector, path))
-}
-
-/// Which axes a list names.
-fn allowed<const D: usize>(
-    checks: &mut Checks,
-    along: Option<&[AxisName]>,
-    path: &Path,
-) -> Option<[bool; D]> {
-    let Some(names) = along else { return Some([true; D]) };
-    let mut allowed = [false; D];
-    for (i, name) in names.iter().enumerate() {
-        let axis = match name {
-            AxisName::X => 0,
-            AxisName::Y => 1,
-            AxisName::Z => 2,
-        };
-        match allowed.get_mut(axis) {
-            None => {
-                checks.fault(&path.index(i), "found \"z\"; expected \"x\" or \"y\" in a 2D job".into());
-                return None;
-            }
-            Some(allowed) => *allowed = true,
-        }
-    }
-    Some(allowed)
 }

@@ -1,7 +1,7 @@
 //! Tables of motion: rows of the job, or of a file.
 use super::super::checks::Checks;
 use super::super::quantities::column;
-use super::optional;
+use super::keys::optional;
 use crate::boundary::motion::{Knot, Table};
 use crate::checksum::fnv1a;
 use crate::job::parse::source::Path;

@@ -1,0 +1,181 @@
+//! Bodies.
+use rustc_hash::FxHashMap;
+
+use super::checks::{Checks, Space, check_names};
+use super::materials::material_setup;
+use super::settings::is_symmetric;
+use super::{stages, stress};
+use crate::geometry::written::Shape as Written;
+use crate::geometry::{Aabb, Sampling, Shape};
+use crate::job::parse::error::QUOTED;
+use crate::job::parse::source::Path;
+use crate::job::problem::*;
+use crate::job::schema::common::FASTEST;
+use crate::job::schema::job_file::{self as file, JobFile};
+use crate::quantity::{AXES, Quantity};
+use crate::text::{excerpt, number, written};
+
+pub(super) fn bodies<const D: usize>(
+    checks: &mut Checks,
+    file: &JobFile,
+    space: &Space<D>,
+    path: &Path,
+) -> Option<Vec<Body<D>>> {
+    if file.sources.is_empty() || !file.bodies.is_empty() {
+        check_names(checks, file.bodies.iter().map(|body| body.name.as_str()), path);
+    }
+    // Of equal names the first counts, as elsewhere.
+    let mut numbers = FxHashMap::default();
+    for (number, material) in file.materials.iter().enumerate() {
+        numbers.entry(material.name.as_str()).or_insert(number);
+    }
+    let bodies: Vec<Body<D>> = (file.bodies.iter().enumerate())
+        .map_while(|(i, body)| {
+            (!checks.is_full()).then(|| self::body(checks, body, &numbers, file, space, &path.index(i)))
+        })
+        .flatten()
+        .collect();
+    (bodies.len() == file.bodies.len()).then_some(bodies)
+}
+
+pub(super) fn body<const D: usize>(
+    checks: &mut Checks,
+    body: &file::Body,
+    materials: &FxHashMap<&str, usize>,
+    file_of: &JobFile,
+    space: &Space<D>,
+    path: &Path,
+) -> Option<Body<D>> {
+    let material = materials.get(body.material.as_str()).copied();
+    if material.is_none() {
+        let known = || file_of.materials.iter().map(|material| material.name.as_str());
+        checks.unknown(&body.material, "material", known, &path.key("material"));
+    }
+    let velocity = match &body.velocity {
+        Some(velocity) => stress::fields(checks, velocity, &path.key("velocity"), FASTEST),
+        None => Some(std::array::from_fn(|_| Quantity::default())),
+    };
+    let angular_velocity = match (&body.angular_velocity, D) {
+        (None, _) => Some([0.0; 3]),
+        (Some(file::Spin::Plane(spin)), 2) => Some([0.0, 0.0, *spin]),
+        (Some(file::Spin::Space(spin)), 3) => Some(*spin),
+        (Some(given), _) => {
+            let (found, expected) = match given {
+                file::Spin::Plane(_) => ("a number", "an array of 3 components in a 3D job"),
+                file::Spin::Space(_) => ("an array", "a number (about z) in a 2D job"),
+            };
+            checks.fault(&path.key("angular_velocity"), format!("found {found}; expected {expected}"));
+            None
+        }
+    };
+    let here = path.key("shape");
+    let given = match &body.shape {
+        Written::Particles { file } => {
+            if body.stress.is_some() {
+                let message =
+                    "found a stress; expected none with particles from a file, which contains their stress";
+                checks.fault(&path.key("stress"), message.into());
+            }
+            let setup = material_setup(&file_of.materials[material?]);
+            Some(checks.particles(file, &body.name, &setup, space, &here.key("file"))?)
+        }
+        _ => None,
+    };
+    let shape: Shape<D> = match &given {
+        Some(given) => Shape::Box(given.bounds().intersection(&Aabb::new([0.0; D], space.size))),
+        None => checks.shape(&body.shape, space, &here)?,
+    };
+    let bounds = shape.bounds();
+    if bounds.is_empty() {
+        checks.fault(&here, "found a shape without a point; expected one with a volume".into());
+        return None;
+    }
+    for a in 0..D {
+        // Lengths in the file are decimal; a face on the domain's may be a few roundings off.
+        let slack = 1e-9 * space.size[a] + 8.0 * f64::EPSILON * space.origin[a].abs();
+        let (low, high) = (bounds.lower[a], bounds.upper[a]);
+        // A plane of symmetry cuts bodies that continue beyond it; particles from a file may not lie there.
+        let is_cut = |side: usize| given.is_none() && is_symmetric(&file_of.boundaries, a, side);
+        let below = low.is_finite() && low < -slack && !is_cut(0);
+        let above = high.is_finite() && high > space.size[a] + slack && !is_cut(1);
+        if below || above || low >= space.size[a] || high <= 0.0 {
+            let (o, low_inside, high_inside) = (space.origin[a], low, high);
+            let [low, high, least, most] = [low + o, high + o, o, o + space.size[a]].map(|x| number(x, 7));
+            let (name, axis) = (excerpt(&body.name, QUOTED), AXES[a]);
+            let side = if below { "min" } else { "max" };
+            // What it needs, in whole roots, counted from the lower corner.
+            let root = file_of.domain.root_edge;
+            let needed = root * (bounds.upper[a] / root - 1e-9).ceil();
+            let grown = match bounds.lower[a] > -slack && needed > space.size[a] {
+                true => format!("; domain.size = {} along {axis} would hold it", number(needed, 7)),
+                false => String::new(),
+            };
+            let lies_inside = low_inside < space.size[a] && high_inside > 0.0;
+            let hint = match (below || above) && lies_inside && given.is_none() {
+                true => {
+                    format!(
+                        "{grown}; boundaries.{axis}_{side} = {{ kind = \"symmetric\" }} would cut it there"
+                    )
+                }
+                false => grown,
+            };
+            checks.fault(
+                &here,
+                format!(
+                    "found the body \"{name}\" from {axis} = {low} to {high}; expected it inside the domain, from {axis} = {least} to {most}{hint}"
+                ),
+            );
+            return None;
+        }
+    }
+    Some(Body {
+        name: body.name.clone(),
+        place: (checks.position)(checks.tree.locate(&here).start),
+        centre: bounds.intersection(&Aabb::new([0.0; D], space.size)).centre(),
+        shape,
+        material: material?,
+        velocity: velocity?,
+        angular_velocity: angular_velocity?,
+        stage: stages::of_body(checks, body, file_of, path),
+        particles_per_cell: body.particles_per_cell,
+        sampling: sampling(checks, body, path)?,
+        given,
+        fed: None,
+        stress: match &body.stress {
+            Some(written) => {
+                let here = path.key("stress");
+                Some(stress::stress::<D>(checks, written, file_of, &file_of.materials[material?], &here)?)
+            }
+            None => None,
+        },
+    })
+}
+
+/// Arrangement of the particles of a body.
+fn sampling<const D: usize>(checks: &mut Checks, body: &file::Body, path: &Path) -> Option<Sampling<D>> {
+    let is_random = matches!(body.sampling, Some(file::Sampling::Jittered | file::Sampling::Poisson));
+    if body.seed.is_some() && !is_random {
+        let message =
+            "found a seed without random places; expected sampling = \"poisson\" or \"jittered\" beside it";
+        checks.fault(&path.key("seed"), message.into());
+        return None;
+    }
+    let seed = u64::from(body.seed.unwrap_or(0));
+    match body.sampling {
+        None | Some(file::Sampling::Lattice) => Some(Sampling::Lattice),
+        Some(file::Sampling::Fitted) => Some(Sampling::Fitted),
+        Some(file::Sampling::Jittered) => Some(Sampling::Jittered(seed)),
+        Some(file::Sampling::Poisson) => {
+            let along_leaf = f64::from(CELLS_PER_LEAF) * body.particles_per_cell;
+            if along_leaf.fract() != 0.0 {
+                let message = format!(
+                    "found {} with sampling = \"poisson\"; expected a multiple of 0.25, for a whole number of particles along the edge of a leaf",
+                    written(body.particles_per_cell)
+                );
+                checks.fault(&path.key("particles_per_cell"), message);
+                return None;
+            }
+            Some(Sampling::poisson(along_leaf as usize, seed))
+        }
+    }
+}
