@@ -30,9 +30,6 @@ pub(super) fn with_axis(file: &JobFile) -> JobFile {
     file
 }
 
-/// Something that an axisymmetric job has: where, what, and what is possible in its place.
-type Found = (Path, &'static str, &'static str);
-
 /// Adds faults for all that an axisymmetric job cannot have.
 pub(super) fn check<const D: usize>(
     checks: &mut Checks,
@@ -41,12 +38,7 @@ pub(super) fn check<const D: usize>(
     colliders: &[Solid<D>],
 ) {
     let root = Path::default();
-    let mut all: Vec<Found> = Vec::new();
-    let mut refuse = |is_there: bool, path: Path, found: &'static str, expected: &'static str| {
-        if is_there {
-            all.push((path, found, expected));
-        }
-    };
+    let mut refuse = checks.refuse_in("an axisymmetric job");
     let starts = file.domain.min.as_ref().and_then(|min| min.0.first()).is_some_and(|&x| x != 0.0);
     refuse(
         starts,
@@ -133,9 +125,6 @@ pub(super) fn check<const D: usize>(
     }
     if let Some(file::Report::ColumnCollapse { law, .. }) = &file.report {
         refuse(*law == CollapseLaw::Planar, root.key("report").key("law"), "\"planar\"", "\"axisymmetric\"");
-    }
-    for (path, found, expected) in all {
-        checks.fault(&path, format!("found {found} in an axisymmetric job; expected {expected}"));
     }
 }
 

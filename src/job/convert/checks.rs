@@ -46,6 +46,16 @@ impl Checks<'_> {
         });
     }
 
+    /// Refuses what jobs of a kind, such as "an axisymmetric job", cannot have: whether it is there, its key,
+    /// what it is, and what is possible in its place.
+    pub(super) fn refuse_in(&mut self, kind: &str) -> impl FnMut(bool, Path, &'static str, &'static str) {
+        move |is_there, path, found, expected| {
+            if is_there {
+                self.fault(&path, format!("found {found} in {kind}; expected {expected}"));
+            }
+        }
+    }
+
     /// Place of the value at `path`.
     pub(crate) fn place(&self, path: &Path) -> Position {
         (self.position)(self.tree.locate(path).start)

@@ -37,12 +37,7 @@ pub(super) fn check<const D: usize>(checks: &mut Checks, file: &JobFile, problem
         return;
     }
     let root = Path::default();
-    let mut all: Vec<(Path, &'static str, &'static str)> = Vec::new();
-    let mut refuse = |is_there: bool, path: Path, found: &'static str, expected: &'static str| {
-        if is_there {
-            all.push((path, found, expected));
-        }
-    };
+    let mut refuse = checks.refuse_in("a quasi-static job");
     let none = "none";
     refuse(file.equilibrium.is_some(), root.key("equilibrium"), "kinetic damping", none);
     for (i, stage) in file.stages.iter().enumerate() {
@@ -109,8 +104,5 @@ pub(super) fn check<const D: usize>(checks: &mut Checks, file: &JobFile, problem
                 refuse(is_named, here.key("kind"), found, expected);
             }
         }
-    }
-    for (path, found, expected) in all {
-        checks.fault(&path, format!("found {found} in a quasi-static job; expected {expected}"));
     }
 }
