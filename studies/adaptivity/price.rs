@@ -257,11 +257,11 @@ fn measure(comm: &Comm, solver: &mut Solver<3>, regrids: usize) {
         }
         steps.sort_by(f64::total_cmp);
         let step = steps[steps.len() / 2];
-        let before = solver.regrid_timers.seconds();
+        let before = solver.adaptation.timers.seconds();
         let start = Instant::now();
         solver.regrid().unwrap_or_else(|error| panic!("{error}"));
         let regrid = start.elapsed().as_secs_f64();
-        let after = solver.regrid_timers.seconds();
+        let after = solver.adaptation.timers.seconds();
         let parts =
             before.iter().zip(&after).map(|(before, after)| format!("{:.4}", (after - before) / step));
         let parts = parts.collect::<Vec<String>>().join(" | ");
