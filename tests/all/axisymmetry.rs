@@ -55,6 +55,36 @@ pub(crate) fn solver(comm: &Comm, text: &str) -> Solver<2> {
     setup::solver(comm, &problem).unwrap_or_else(|error| panic!("{error}"))
 }
 
+/// A piston of 50 kg sticks to a column without Poisson's effect, whose foot is held: with the column's stiffness
+/// `E π R² / L` and a third of its mass it oscillates as a mass on a spring. Masses and forces are those of the
+/// whole circumference.
+#[test]
+fn a_piston_on_a_column_is_a_mass_on_a_spring() {
+    let (mass, young, radius, length, density, speed) = (50.0, 1e6, 0.1, 0.4, 100.0, 0.05);
+    let text = format!(
+        "version = 1\ndimension = 2\ngeometry = 'axisymmetric'\n\
+         [domain]\nsize = [0.2, 0.6]\nroot_edge = 0.1\n[boundaries]\ny_min = {{ kind = 'sticky' }}\n\
+         [[materials]]\nname = 'rubber'\ndensity = {density}\nmodel = 'hencky'\nyoung = {young}\npoisson = 0\n\
+         [[bodies]]\nname = 'column'\nmaterial = 'rubber'\n\
+         shape = {{ kind = 'box', min = [0, 0], max = [{radius}, {length}] }}\n\
+         [[colliders]]\nname = 'piston'\nshape = {{ kind = 'box', min = [-0.15, {length}], max = [0.15, 0.5] }}\n\
+         contact = {{ kind = 'sticky' }}\nacts_on = 'nodes'\n\
+         motion = {{ kind = 'free', mass = {mass}, along = ['y'], velocity = [0, -{speed}] }}\n\
+         [time]\nend = 0.2\n[output]\npicture = false\n[history]\nevery_steps = 1\n"
+    );
+    let history = history("piston", &text);
+    let stiffness = young * PI * radius * radius / length;
+    let moving = mass + density * PI * radius * radius * length / 3.0;
+    let pace = (stiffness / moving).sqrt();
+    let (times, places) = (history.column("time"), history.column("position_piston_y"));
+    let places: Vec<f64> = places.iter().map(|y| y - places[0]).collect();
+    let lowest = places.iter().copied().fold(0.0, f64::min);
+    assert!((lowest * pace / -speed - 1.0).abs() < 0.01, "{lowest} m for {} m", -speed / pace);
+    let back =
+        times.iter().zip(&places).find(|(t, y)| **t > 0.5 * PI / pace && **y >= 0.0).expect("comes back").0;
+    assert!((back * pace / PI - 1.0).abs() < 0.01, "{back} s for {} s", PI / pace);
+}
+
 const REFINED: &str = "[tree]\n[[tree.regions]]\nlevel = 1\n\
     shape = { kind = 'box', min = [0, 0], max = [0.4, 0.4] }\n";
 

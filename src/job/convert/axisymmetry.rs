@@ -7,8 +7,8 @@ use crate::boundary::Collider as Solid;
 use crate::geometry::written::Shape;
 use crate::job::parse::source::Path;
 use crate::job::problem::{CollapseLaw, Coordinates, Field, MaterialSetup};
-use crate::job::schema::colliders::{Collider, Motion, Row};
-use crate::job::schema::common::Spin;
+use crate::job::schema::colliders::{Collider, Motion, MotionRecord, Row};
+use crate::job::schema::common::{AxisName, Spin};
 use crate::job::schema::job_file::{self as file, Boundaries, Face, Geometry, JobFile, Quantity};
 
 /// Coordinates of a job.
@@ -168,21 +168,37 @@ fn collider(
             refuse(turns, here.key("angular_velocity"), "a rotation", along);
         }
         Some(Motion::Table { rows, record, .. }) => {
-            let is_along = |row: &Row| {
-                let across = row.translation.as_ref().and_then(|x| x.0.first()).is_some_and(|&x| x != 0.0);
-                !across && row.rotation == 0.0
-            };
-            let row = rows.iter().flatten().position(|row| !is_along(row));
-            refuse(
-                row.is_some(),
-                here.key("rows").index(row.unwrap_or(0)),
-                "a motion across the axis",
-                along,
-            );
-            let across =
-                record.as_ref().is_some_and(|record| record.x.is_some() || record.rotation.is_some());
-            refuse(across, here.key("record"), "a motion across the axis", along);
+            refuse_rows(rows.as_deref(), record.as_ref(), &here, refuse)
         }
-        Some(Motion::Free { .. }) => refuse(true, here.key("kind"), "a free body", "a prescribed motion"),
+        Some(Motion::Free {
+            along: free, density, turns, inertia, angular_velocity, rows, record, ..
+        }) => {
+            let is_along = free.as_deref().is_some_and(|axes| axes.iter().all(|axis| *axis == AxisName::Y));
+            refuse(!is_along, here.key("along"), "a free body that moves across the axis", "along = [\"y\"]");
+            let whole = "`mass`, of the whole body of revolution";
+            refuse(density.is_some(), here.key("density"), "a free body by its density", whole);
+            refuse(*turns == Some(true), here.key("turns"), "a rotation", along);
+            refuse(inertia.is_some(), here.key("inertia"), "a rotation", along);
+            refuse(angular_velocity.is_some(), here.key("angular_velocity"), "a rotation", along);
+            refuse_rows(rows.as_deref(), record.as_ref(), &here, refuse);
+        }
     }
+}
+
+/// A table of motions, which lead along the axis.
+fn refuse_rows(
+    rows: Option<&[Row]>,
+    record: Option<&MotionRecord>,
+    path: &Path,
+    refuse: &mut impl FnMut(bool, Path, &'static str, &'static str),
+) {
+    let along = "a motion along the axis, y, without rotation";
+    let is_along = |row: &Row| {
+        let across = row.translation.as_ref().and_then(|x| x.0.first()).is_some_and(|&x| x != 0.0);
+        !across && row.rotation == 0.0
+    };
+    let row = rows.into_iter().flatten().position(|row| !is_along(row));
+    refuse(row.is_some(), path.key("rows").index(row.unwrap_or(0)), "a motion across the axis", along);
+    let across = record.is_some_and(|record| record.x.is_some() || record.rotation.is_some());
+    refuse(across, path.key("record"), "a motion across the axis", along);
 }

@@ -130,7 +130,7 @@ pub enum Motion {
     /// touches within a cell of its surface. Unless `collides = false` it collides with the faces of the
     /// domain, other than `symmetric`, `outflow` and `absorbing` ones, and other colliders.
     Free {
-        /// Mass, kg; in 2D of one metre of thickness. Either this or `density`.
+        /// Mass, kg; in plane strain of one metre of thickness, of bodies of revolution of the whole. Either this or `density`.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         #[schemars(range(max = 1e24), extend("exclusiveMinimum" = 0.0))]
         mass: Option<f64>,
