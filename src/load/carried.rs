@@ -22,7 +22,7 @@ pub struct Carried<const D: usize> {
 #[derive(Clone, Debug)]
 pub enum CarriedForce<const D: usize> {
     /// Dead traction t (Pa): `t A` with the undeformed area A (m², in plane strain m), which is the
-    /// particle's first number; where t depends on the place, the undeformed area vector follows.
+    /// particle's first number; the area vector of the deformed surface follows.
     Traction([Quantity; D]),
     /// Pressure p (Pa) against the outward normal: `-p a` with the area vector a (m², in plane strain m), one
     /// number per axis.
@@ -45,8 +45,8 @@ impl<const D: usize> CarriedForce<D> {
     /// Numbers that a particle carries for it.
     pub fn columns(&self) -> usize {
         match self {
-            Self::Traction(_) if self.depends_on_place() => 1 + D,
-            Self::Traction(_) | Self::Point { .. } => 1,
+            Self::Traction(_) => 1 + D,
+            Self::Point { .. } => 1,
             Self::Pressure { .. } => D,
         }
     }
@@ -81,34 +81,37 @@ impl<const D: usize> Carried<D> {
         self.bodies.as_ref().is_none_or(|bodies| bodies.iter().any(|&own| usize::from(own) == body))
     }
 
-    /// Whether the numbers follow the deformation.
-    pub fn follows(&self) -> bool {
-        matches!(self.force, CarriedForce::Pressure { follows: true, .. })
+    /// First of the numbers of the area vector, m², if particles carry one.
+    fn area_vector(&self) -> Option<usize> {
+        match self.force {
+            CarriedForce::Pressure { .. } => Some(0),
+            CarriedForce::Traction(_) => Some(1),
+            CarriedForce::Point { .. } => None,
+        }
+    }
+
+    /// First column of the area vector that follows the deformation, if there is one.
+    pub fn following(&self) -> Option<usize> {
+        let is_fixed = matches!(self.force, CarriedForce::Pressure { follows: false, .. });
+        Some(self.first + self.area_vector().filter(|_| !is_fixed)?)
     }
 
     /// Numbers, one per column, that a particle carries for a piece of surface with this area vector, m².
     pub fn of_surface(&self, area: &[f64; D]) -> Vec<f64> {
         match self.force {
             CarriedForce::Pressure { .. } => area.to_vec(),
-            CarriedForce::Traction(_) if self.force.depends_on_place() => {
-                [length(area)].into_iter().chain(*area).collect()
-            }
-            _ => vec![length(area)],
+            CarriedForce::Traction(_) => [length(area)].into_iter().chain(*area).collect(),
+            CarriedForce::Point { .. } => vec![length(area)],
         }
     }
 
     /// Vector (m) from the centre of a particle that carries these numbers to the surface that they stand
     /// for, where a force on surfaces depends on the place; `half` are the half widths of its box, m. On an
     /// inclined surface particles lie at all distances, so the vector has their mean.
-    pub fn way_to_surface(&self, numbers: &[f64], half: impl FnOnce() -> [f64; D]) -> [f64; D] {
-        let first = match self.force {
-            CarriedForce::Pressure { .. } => 0,
-            CarriedForce::Traction(_) => 1,
-            CarriedForce::Point { .. } => return [0.0; D],
-        };
-        if !self.force.depends_on_place() {
+    pub fn way_to_surface(&self, numbers: &[f64], half: &[f64; D]) -> [f64; D] {
+        let Some(first) = self.area_vector().filter(|_| self.force.depends_on_place()) else {
             return [0.0; D];
-        }
+        };
         let area: [f64; D] = std::array::from_fn(|a| numbers[first + a]);
         let size = length(&area);
         if size == 0.0 {
@@ -116,9 +119,35 @@ impl<const D: usize> Carried<D> {
         }
         // Along the main axis of the normal each line of particles has one at the surface, half a width from
         // it in the mean.
-        let (normal, half) = (area.map(|a| a / size), half());
+        let normal = area.map(|a| a / size);
         let main = normal.iter().fold(0.0_f64, |greatest, n| greatest.max(n.abs()));
         std::array::from_fn(|a| main * normal[a] * half[a])
+    }
+
+    /// First moment (N m) of this force (N) on a particle that carries these numbers: component i by the place along
+    /// k. The parts of the area across each axis act at the face of its box there, with the half widths `half`, m; a
+    /// pressure along that axis alone. The moment is about its centre of mass, which lies `ahead` of the
+    /// middle of the box along the first axis, m. `None` for forces on points.
+    pub fn moment(
+        &self,
+        numbers: &[f64],
+        force: &[f64; D],
+        half: &[f64; D],
+        ahead: f64,
+    ) -> Option<[[f64; D]; D]> {
+        let first = self.area_vector()?;
+        let area: [f64; D] = std::array::from_fn(|a| numbers[first + a]);
+        let total: f64 = area.iter().map(|a| a.abs()).sum();
+        if total == 0.0 {
+            return None;
+        }
+        let is_pressure = matches!(self.force, CarriedForce::Pressure { .. });
+        let share = |i: usize, k: usize| match is_pressure {
+            true => f64::from(u8::from(i == k && area[k] != 0.0)),
+            false => area[k].abs() / total,
+        };
+        let way = |k: usize| area[k].signum() * half[k] - if k == 0 { ahead } else { 0.0 };
+        Some(std::array::from_fn(|i| std::array::from_fn(|k| force[i] * share(i, k) * way(k))))
     }
 
     /// The size of the area that a particle with these numbers stands for, m².
@@ -217,9 +246,9 @@ mod tests {
         let carried = traction.carried().unwrap();
         // With the area vector, for the place of the surface.
         assert_eq!(carried.of_surface(&[3.0, 4.0]), [5.0, 3.0, 4.0]);
-        let way = carried.way_to_surface(&[5.0, 0.0, -5.0], || [0.1, 0.2]);
+        let way = carried.way_to_surface(&[5.0, 0.0, -5.0], &[0.1, 0.2]);
         assert_eq!(way, [0.0, -0.2]);
-        let way = carried.way_to_surface(&[2.0, 1.0, 1.0], || [0.1, 0.2]);
+        let way = carried.way_to_surface(&[2.0, 1.0, 1.0], &[0.1, 0.2]);
         assert!((way[0] - 0.05).abs() < 1e-15 && (way[1] - 0.1).abs() < 1e-15);
         assert_eq!(
             traction.force(carried, &[5.0], &traction.place(&[0.5, 0.0], &[0.0; 2]), 2.0),

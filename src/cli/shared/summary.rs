@@ -43,7 +43,8 @@ pub(in crate::cli) fn write<const D: usize>(
     let size: Vec<String> = problem.size().iter().map(|edge| number(*edge, 7)).collect();
     let roots: Vec<String> = problem.brick.roots.iter().map(u32::to_string).collect();
     writeln!(out, "domain       {} m, {} root octants", size.join(" x "), roots.join(" x "))?;
-    if problem.coordinates == Coordinates::Axisymmetric {
+    let is_ring = problem.coordinates == Coordinates::Axisymmetric;
+    if is_ring {
         writeln!(
             out,
             "geometry     bodies of revolution; masses, forces and energies of the whole circumference"
@@ -113,7 +114,7 @@ pub(in crate::cli) fn write<const D: usize>(
             let stages = in_stages(problem, &problem.load_stages[number]);
             writeln!(out, "  {:18} {}{stages}", excerpt(&load.name, NAME), load_in_words(load))?;
             if let Some(totals) = load.carried().and_then(|_| carried.next()) {
-                writeln!(out, "  {:18} {}", "", carried_in_words::<D>(totals, load.from.max(0.0)))?;
+                writeln!(out, "  {:18} {}", "", carried_in_words::<D>(totals, is_ring, load.from.max(0.0)))?;
             }
         }
     }
@@ -230,10 +231,11 @@ fn plural(ranks: u32) -> String {
     if ranks == 1 { "1 rank".into() } else { format!("{ranks} ranks") }
 }
 
-/// Particles, surface and force of a load that particles carry, in words; the force is that at `time`, s.
-fn carried_in_words<const D: usize>(totals: &CarriedTotals, time: f64) -> String {
+/// Particles, surface and force of a load that particles carry, in words, with the whole circumference of rings;
+/// the force is that at `time`, s.
+fn carried_in_words<const D: usize>(totals: &CarriedTotals, is_ring: bool, time: f64) -> String {
     let area = match (totals.area, D) {
-        (Some(area), 2) => format!(", {} of surface", quantity(area, "m")),
+        (Some(area), 2) if !is_ring => format!(", {} of surface", quantity(area, "m")),
         (Some(area), _) => format!(", {} m² of surface", number(area, 6)),
         (None, _) => String::new(),
     };

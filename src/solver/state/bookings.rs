@@ -124,8 +124,12 @@ pub(in crate::solver) struct ParticlePush<const D: usize> {
     pub load: u32,
     /// The force, N.
     pub force: [f64; D],
+    /// Its moment about the centre of the particle, N m: component i by the place along k.
+    pub moment: [[f64; D]; D],
     /// Place of the particle, m; after G2P its displacement in the step, m.
     pub way: [f64; D],
+    /// Work of the moment in the step, J.
+    pub turn: f64,
 }
 
 /// Totals of a load that particles carry.

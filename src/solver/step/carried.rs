@@ -4,16 +4,22 @@
 //!
 //! A particle's force f goes to the nodes with the weights of its mass: `p_j += w Δt f`. So for P2G the
 //! particle has the velocity `v + Δt f / m`, and its own again afterwards: the force passes through parts of
-//! boxes and constrained nodes like momentum, and no kernel handles loads. Its work is `f · Δx` with the
-//! displacement Δx of the particle.
+//! boxes and constrained nodes like momentum, and no kernel handles loads.
+//!
+//! A force on a surface acts at the surface, with the moment `M = f ⊗ d` by its way d from the centre of the particle: to first
+//! order nodes get `Δt (w f + M ∇w)`, so that uniform stress balances a uniform load to round-off where boxes tile cells. At the
+//! centres it would leave half of the load in the outermost row. The second term is that of a stress `−M / V₀`, which the particle has for
+//! P2G, of M the symmetric part. The work is `f · Δx + Δt M : ∇v` with the displacement Δx of the particle.
 use rayon::prelude::*;
 
 use crate::exact_sum::ExactSum;
+use crate::kernel::Coordinates;
 use crate::leapfrog::Lengths;
 use crate::load::{Carried, Kind, Load, cofactor};
 use crate::particle::chunk::{Chunk, Layout, Tag};
 use crate::particle::followed::head;
 use crate::particle::strain;
+use crate::particle::volume::box_volume;
 use crate::simd::Vector;
 use crate::solver::sorting::box_bounds::Widths;
 use crate::solver::sorting::box_widths::BoxWidths;
@@ -21,8 +27,13 @@ use crate::solver::state::Solver;
 use crate::solver::state::bookings::{CarriedTotals, ParticlePush};
 use crate::solver::state::phases::Phase;
 
-/// Velocities of particles before an impulse.
-pub(in crate::solver) type Velocities<const D: usize> = Vec<(u32, [f64; D])>;
+/// A particle before an impulse.
+pub(in crate::solver) struct Unpushed<const D: usize> {
+    particle: u32,
+    velocity: [f64; D],
+    /// First of some columns, and their values, where a force acts at a surface.
+    stress: Option<(usize, Vec<f64>)>,
+}
 
 /// Greatest number of columns that a particle carries for a load.
 const MOST: usize = 4;
@@ -35,19 +46,45 @@ fn numbers<const D: usize>(chunk: &Chunk<D>, carried: &Carried<D>, p: usize) -> 
     numbers.iter().any(|&number| number != 0.0).then_some(numbers)
 }
 
-/// Place (m) at which a force on the surface is evaluated for a particle: at the surface if the force depends
-/// on the place.
+/// Place (m) at which a force on the surface is evaluated for a particle, whose box has these half widths (m): at
+/// the surface if the force depends on the place.
 fn surface_at<const D: usize>(
-    widths: &Widths<'_, D>,
     chunk: &Chunk<D>,
     carried: &Carried<D>,
     numbers: &[f64],
     p: usize,
-    cell: f64,
+    half: &[f64; D],
 ) -> [f64; D] {
-    let half = || half_widths(widths, chunk, p, cell);
     let (x, way) = (chunk.position(p), carried.way_to_surface(numbers, half));
     std::array::from_fn(|a| x[a] + way[a])
+}
+
+/// Adds `−M / V₀` with the moments M of some forces to the stress that a particle has for P2G. Returns what it was.
+fn push_stress<const D: usize>(
+    chunk: &mut Chunk<D>,
+    p: usize,
+    pushes: &[ParticlePush<D>],
+    is_in_steps: bool,
+) -> (usize, Vec<f64>) {
+    let [half] = chunk.read(Layout::<D>::HALF, p);
+    let volume = box_volume::<D>(half);
+    let moment = |i: usize, k: usize| pushes.iter().map(|push| push.moment[i][k]).sum::<f64>() / volume;
+    let (first, count) = match is_in_steps {
+        true => (Layout::<D>::AFFINE, D * D),
+        false => (Layout::<D>::STRESS, 6),
+    };
+    let column = |c: usize| chunk.column(first + c)[p];
+    let before: Vec<f64> = (0..count).map(column).collect();
+    let mut after = before.clone();
+    for (i, k) in (0..D).flat_map(|i| (0..D).map(move |k| (i, k))) {
+        match is_in_steps {
+            true => after[D * i + k] -= moment(i, k),
+            false if i == k => after[i] -= moment(i, i),
+            false => after[i + k + 2] -= 0.5 * moment(i, k),
+        }
+    }
+    chunk.write(first, p, &after);
+    (first, before)
 }
 
 /// Half widths of the box of a particle in a leaf with cells of this edge, m.
@@ -75,6 +112,10 @@ struct Pushing<'a, const D: usize> {
     densities: Vec<[f64; 2]>,
     /// Whether forces act on all particles, and not only on those that carry something.
     all: bool,
+    /// Those of the job.
+    coordinates: Coordinates,
+    /// Whether affine columns hold the stress, as in load steps.
+    is_in_steps: bool,
     /// Middle of the time over which forces act, s.
     middle: f64,
     /// Its length, s.
@@ -90,7 +131,7 @@ impl<const D: usize> Pushing<'_, D> {
         cell: f64,
         scale: f64,
         pushes: &mut Vec<ParticlePush<D>>,
-    ) -> Velocities<D> {
+    ) -> Vec<Unpushed<D>> {
         let mut before = Vec::new();
         let has_water = self.loads.iter().any(|(_, load)| matches!(load.kind, Kind::Water(_)));
         let boxes = if has_water { self.widths.of_leaf(chunk, cell) } else { Vec::new() };
@@ -98,17 +139,21 @@ impl<const D: usize> Pushing<'_, D> {
             let from = pushes.len();
             let mass = chunk.column(Layout::<D>::MASS)[p];
             for &(number, load) in &self.loads {
-                if let Some(force) = self.force(chunk, p, load, (cell, boxes.get(p)), mass / scale) {
-                    let way = chunk.position(p);
-                    pushes.push(ParticlePush { particle: p as u32, load: number as u32, force, way });
+                if let Some((force, moment)) = self.force(chunk, p, load, (cell, boxes.get(p)), mass / scale)
+                {
+                    let (particle, load, way) = (p as u32, number as u32, chunk.position(p));
+                    pushes.push(ParticlePush { particle, load, force, moment, way, turn: 0.0 });
                 }
             }
             if self.all || from < pushes.len() {
                 let velocity: [f64; D] = chunk.read(Layout::<D>::VELOCITY, p);
-                before.push((p as u32, velocity));
+                let pushes = &pushes[from..];
+                let is_at_surface = pushes.iter().any(|push| push.moment != [[0.0; D]; D]);
+                let stress = is_at_surface.then(|| push_stress(chunk, p, pushes, self.is_in_steps));
+                before.push(Unpushed { particle: p as u32, velocity, stress });
                 let falling =
                     std::array::from_fn(|a| (self.kick / scale).mul_add(self.on_particles[a], velocity[a]));
-                let pushed = pushes[from..].iter().fold(falling, |velocity: [f64; D], push| {
+                let pushed = pushes.iter().fold(falling, |velocity: [f64; D], push| {
                     std::array::from_fn(|a| self.kick.mul_add(push.force[a] / mass, velocity[a]))
                 });
                 chunk.write(Layout::<D>::VELOCITY, p, &pushed);
@@ -125,8 +170,8 @@ impl<const D: usize> Pushing<'_, D> {
         mass / (density * full.mul_add(saturated - 1.0, 1.0))
     }
 
-    /// Force of a load on a particle of this mass (kg) in a leaf with cells of this edge (m), N, if it has any.
-    /// Water needs the half widths of its box, m.
+    /// Force of a load on a particle of this mass (kg) in a leaf with cells of this edge (m), N, if it has any, and
+    /// its moment about the centre, N m. Water needs the half widths of its box, m.
     fn force(
         &self,
         chunk: &Chunk<D>,
@@ -134,13 +179,17 @@ impl<const D: usize> Pushing<'_, D> {
         load: &Load<D>,
         (cell, half): (f64, Option<&[f64; D]>),
         mass: f64,
-    ) -> Option<[f64; D]> {
+    ) -> Option<([f64; D], [[f64; D]; D])> {
+        let at_centre = |force: [f64; D]| (force, [[0.0; D]; D]);
         let place = |x: &[f64; D]| load.place(x, &displacement(chunk, self.displacement, p));
         match &load.kind {
             Kind::Carried(carried) => {
                 let numbers = numbers(chunk, carried, p)?;
-                let x = surface_at(&self.widths, chunk, carried, &numbers, p, cell);
-                Some(load.force(carried, &numbers, &place(&x), self.middle - load.start))
+                let half = half_widths(&self.widths, chunk, p, cell);
+                let x = surface_at(chunk, carried, &numbers, p, &half);
+                let force = load.force(carried, &numbers, &place(&x), self.middle - load.start);
+                let ahead = self.coordinates.to_mass_centre(half[0], chunk.position(p)[0]);
+                Some((force, carried.moment(&numbers, &force, &half, ahead).unwrap_or([[0.0; D]; D])))
             }
             Kind::Water(water) => {
                 let at = place(&chunk.position(p)).now;
@@ -148,12 +197,13 @@ impl<const D: usize> Pushing<'_, D> {
                 let per_volume = water.force(at, half?, self.middle - load.start, &self.gravity);
                 (per_volume != [0.0; D]).then(|| {
                     let volume = self.volume_of_mass(chunk, p, mass);
-                    per_volume.map(|force| volume * force)
+                    at_centre(per_volume.map(|force| volume * force))
                 })
             }
             _ => {
                 let x = chunk.position(p);
-                load.body_force(&x, &place(&x), self.middle).map(|per_mass| per_mass.map(|a| mass * a))
+                load.body_force(&x, &place(&x), self.middle)
+                    .map(|per_mass| at_centre(per_mass.map(|a| mass * a)))
             }
         }
     }
@@ -166,9 +216,9 @@ fn displacement<const D: usize>(chunk: &Chunk<D>, first: Option<usize>, p: usize
 }
 
 impl<const D: usize> Solver<D> {
-    /// Not collective. Gives particles the impulse of the forces on them, for P2G. Returns their velocities
+    /// Not collective. Gives particles the impulse of the forces on them, for P2G. Returns what they were
     /// before, by leaf, for [`Solver::take_back_push`]; empty if no force acts.
-    pub(in crate::solver) fn push_particles(&mut self, lengths: Lengths) -> Vec<Velocities<D>> {
+    pub(in crate::solver) fn push_particles(&mut self, lengths: Lengths) -> Vec<Vec<Unpushed<D>>> {
         let (physics, time) = (&self.physics, self.clock.time);
         let scaled = physics.has_scaled_masses();
         let loads = physics.loads.iter().enumerate();
@@ -181,6 +231,8 @@ impl<const D: usize> Solver<D> {
         let pushing = Pushing {
             widths: physics.widths(plan),
             all: scaled || loads.iter().any(|(_, load)| load.carried().is_none()),
+            coordinates: physics.coordinates,
+            is_in_steps: physics.quasi_static.is_some(),
             loads: loads.into_iter().filter(|(_, load)| load.is_active(time)).collect(),
             displacement: physics.followed_columns().displacement,
             head: physics.followed_columns().head,
@@ -227,10 +279,15 @@ impl<const D: usize> Solver<D> {
         });
     }
 
-    /// Not collective. Restores the velocities before the impulses.
-    pub(in crate::solver) fn take_back_push(&mut self, before: &[Velocities<D>]) {
+    /// Not collective. Restores velocities and stress before the impulses.
+    pub(in crate::solver) fn take_back_push(&mut self, before: &[Vec<Unpushed<D>>]) {
         for (chunk, before) in self.chunks.iter_mut().zip(before) {
-            before.iter().for_each(|(p, velocity)| chunk.write(Layout::<D>::VELOCITY, *p as usize, velocity));
+            for Unpushed { particle, velocity, stress } in before {
+                chunk.write(Layout::<D>::VELOCITY, *particle as usize, velocity);
+                if let Some((first, values)) = stress {
+                    chunk.write(*first, *particle as usize, values);
+                }
+            }
         }
     }
 
@@ -243,6 +300,7 @@ impl<const D: usize> Solver<D> {
                 sums[a].add(kick * push.force[a]);
                 sums[3].add(push.force[a] * push.way[a]);
             }
+            sums[3].add(push.turn);
         }
     }
 
@@ -261,8 +319,8 @@ impl<const D: usize> Solver<D> {
                 for p in 0..chunk.len() {
                     let Some(numbers) = numbers(chunk, carried, p) else { continue };
                     count[0] += 1;
-                    let x =
-                        surface_at(&widths, chunk, carried, &numbers, p, self.grid.plan.finest_cell(leaf));
+                    let half = half_widths(&widths, chunk, p, self.grid.plan.finest_cell(leaf));
+                    let x = surface_at(chunk, carried, &numbers, p, &half);
                     let place = load.place(&x, &displacement(chunk, moved, p));
                     let force = load.force(carried, &numbers, &place, time);
                     (0..D).for_each(|a| sums[a].add(force[a]));
@@ -285,6 +343,24 @@ pub(super) fn note_ways<const D: usize>(chunk: &Chunk<D>, pushes: &mut [Particle
         let x = chunk.position(push.particle as usize);
         // The difference is exact, since a step is short.
         push.way = std::array::from_fn(|a| x[a] - push.way[a]);
+    }
+}
+
+/// Adds the work of the moments of the forces on a particle, by a step with this velocity gradient, 1/s.
+pub(super) fn note_turn<const D: usize>(
+    pushes: &mut [ParticlePush<D>],
+    p: usize,
+    gradient: &[[f64; D]; D],
+    dt: f64,
+) {
+    let first = pushes.partition_point(|push| (push.particle as usize) < p);
+    for push in pushes[first..].iter_mut().take_while(|push| push.particle as usize == p) {
+        let components = (0..D).flat_map(|i| (0..D).map(move |k| (i, k)));
+        // Of the moment P2G has the symmetric part.
+        let work = components.fold(0.0, |sum, (i, k)| {
+            0.5f64.mul_add(push.moment[i][k] * (gradient[i][k] + gradient[k][i]), sum)
+        });
+        push.turn = dt * work;
     }
 }
 
@@ -320,17 +396,17 @@ pub(super) fn strain<const D: usize>(
     strain::write(chunk, first, p, &e);
 }
 
-/// Whether any particle of a chunk carries areas that follow the deformation.
-pub(super) fn has_followers<const D: usize>(chunk: &Chunk<D>, following: &[&Carried<D>]) -> bool {
-    let carries = |p: usize| following.iter().any(|carried| numbers(chunk, carried, p).is_some());
-    !following.is_empty() && chunk.carried_columns() > 0 && (0..chunk.len()).any(carries)
+/// Whether any particle of a chunk carries forces on surfaces.
+pub(super) fn has_surfaces<const D: usize>(chunk: &Chunk<D>, on_surfaces: &[&Carried<D>]) -> bool {
+    let carries = |p: usize| on_surfaces.iter().any(|carried| numbers(chunk, carried, p).is_some());
+    !on_surfaces.is_empty() && chunk.carried_columns() > 0 && (0..chunk.len()).any(carries)
 }
 
 /// Updates the areas that a particle carries, by a step with this velocity gradient and rate along the hoop
 /// (1/s): `da ← J f⁻ᵀ da`, `f = 1 + Δt ∇v`.
 pub(super) fn follow<const D: usize>(
     chunk: &mut Chunk<D>,
-    following: &[&Carried<D>],
+    on_surfaces: &[&Carried<D>],
     p: usize,
     (gradient, hoop): (&[[f64; D]; D], f64),
     dt: f64,
@@ -340,11 +416,14 @@ pub(super) fn follow<const D: usize>(
         std::array::from_fn(|j| dt.mul_add(gradient[i][j], if i == j { 1.0 } else { 0.0 }))
     });
     let turn = cofactor::<D>(&f);
-    for carried in following {
-        let Some(area) = numbers(chunk, carried, p) else { continue };
+    for first in on_surfaces.iter().filter_map(|carried| carried.following()) {
+        let area: [f64; D] = std::array::from_fn(|a| chunk.carried(first + a).get(p).copied().unwrap_or(0.0));
+        if area == [0.0; D] {
+            continue;
+        }
         for i in 0..D {
             let turned = (0..D).fold(0.0, |sum, j| turn[i][j].mul_add(area[j], sum));
-            chunk.carried_mut(carried.first + i)[p] = around * turned;
+            chunk.carried_mut(first + i)[p] = around * turned;
         }
     }
 }

@@ -32,7 +32,7 @@ use crate::solver::state::bookings::{FAILED_SUMS, Near, ParticlePush, SourcePush
 use crate::solver::state::grid::{Grid, VelocityField};
 use crate::solver::state::leaf_data::LeafData;
 use crate::solver::state::phases::Phase;
-use crate::solver::step::carried::{add_ways, follow, has_followers, note_ways, positions, strain};
+use crate::solver::step::carried::{add_ways, follow, has_surfaces, note_turn, note_ways, positions, strain};
 use crate::solver::step::contact::guard::Guard;
 use crate::solver::step::failed::{Failures, Found};
 use crate::solver::step::fill::means::MeanVolumes;
@@ -106,8 +106,8 @@ struct Sweep<'a, const D: usize> {
     looks_at_widths: bool,
     /// Where the particles of each leaf lie.
     places: &'a [Place],
-    /// Loads with areas that follow the deformation.
-    following: &'a [&'a Carried<D>],
+    /// Forces on surfaces that particles carry.
+    on_surfaces: &'a [&'a Carried<D>],
     /// Colliders that act on particles.
     guard: Option<Guard<'a, D>>,
     /// Faces of the domain.
@@ -185,8 +185,8 @@ impl<const D: usize> Solver<D> {
         self.particle_forces.loads.resize_with(self.chunks.len(), Vec::new);
         self.particle_forces.near.resize_with(self.chunks.len(), Vec::new);
         self.particle_forces.conveyed.resize_with(self.chunks.len(), Vec::new);
-        let following = self.physics.loads.iter().filter_map(Load::carried);
-        let following: Vec<&Carried<D>> = following.filter(|carried| carried.follows()).collect();
+        let carried = self.physics.loads.iter().filter_map(Load::carried);
+        let on_surfaces: Vec<&Carried<D>> = carried.filter(|carried| carried.force.is_on_surface()).collect();
         let flows = self.physics.flows(self.clock.time, dt);
         let LeafData { signal, maxima, shifts, shocks, struck, failed, places, times } = &mut self.leaf_data;
         let has_increments = scheme.transfer.has_increments();
@@ -203,7 +203,7 @@ impl<const D: usize> Solver<D> {
             watch: watch.unwrap_or_default(),
             looks_at_widths,
             places,
-            following: &following,
+            on_surfaces: &on_surfaces,
             guard: Guard::new(&self.physics.colliders, &self.contacts.states, rates, [to, dt], plan.extent()),
             barrier: Barrier::new(&self.physics, plan.extent()),
             displacement: self.physics.followed_columns().displacement,
@@ -336,7 +336,8 @@ impl<const D: usize> Sweep<'_, D> {
         note_ways(chunk, pushes);
         for (p, mut gradient, hoop) in scratch.gradients.drain(..) {
             let p = p as usize;
-            follow(chunk, self.following, p, (&gradient, hoop), self.dt);
+            note_turn(pushes, p, &gradient, self.dt);
+            follow(chunk, self.on_surfaces, p, (&gradient, hoop), self.dt);
             let added = scratch.mean_dilation.added.get(p).copied().unwrap_or(0.0);
             (0..D).for_each(|i| gradient[i][i] += added);
             self.tensors.iter().for_each(|&first| strain(chunk, first, p, &gradient, self.dt));
@@ -490,7 +491,7 @@ impl<const D: usize> Sweep<'_, D> {
 
     /// Whether particles of a leaf carry quantities that follow the deformation: areas or total strains.
     fn needs_gradients(&self, chunk: &Chunk<D>) -> bool {
-        !self.tensors.is_empty() || has_followers(chunk, self.following)
+        !self.tensors.is_empty() || has_surfaces(chunk, self.on_surfaces)
     }
 
     /// Advances the particles whose boxes are cut, once all parts have gathered. Returns as
