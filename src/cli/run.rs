@@ -174,11 +174,12 @@ fn print(
         more => writeln!(out, ", {more} warnings")?,
     }
     let series = shell_word(&summary.series);
+    let colour = if summary.is_still { "" } else { " --colour speed" };
     writeln!(out, "turn     agimp view {series}")?;
     if let Some(last) = &summary.last_output {
-        writeln!(out, "draw     agimp plot {} --colour speed", shell_word(last))?;
+        writeln!(out, "draw     agimp plot {}{colour}", shell_word(last))?;
     }
-    writeln!(out, "play     agimp movie {series} --colour speed")?;
+    writeln!(out, "play     agimp movie {series}{colour}")?;
     if !matches!(page, Some(Ok(_))) {
         let directory = shell_word(&results.directory);
         let is_alone = Results::in_directory(&results.directory, None).is_ok();

@@ -233,6 +233,11 @@ impl<const D: usize> Problem<D> {
         loads.find_map(|(load, stages)| load.water().filter(|_| stages.has(stage)))
     }
 
+    /// Whether a stage looks for a factor of safety.
+    pub fn has_reduction(&self) -> bool {
+        self.stages.iter().any(|stage| stage.reduction.is_some())
+    }
+
     /// Whether stages or the run end at an equilibrium.
     pub fn has_equilibrium(&self) -> bool {
         self.stages.iter().any(|stage| stage.equilibrium.is_some())
@@ -409,6 +414,23 @@ pub struct Stage<const D: usize> {
     pub at_rest: bool,
     /// Whether displacements are counted from its start.
     pub reset_displacement: bool,
+    /// Search for the factor of safety, with which the run ends.
+    pub reduction: Option<FactorSearch>,
+}
+
+/// Search for the greatest factor with whose strength over it there is equilibrium.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FactorSearch {
+    /// First factor.
+    pub from: f64,
+    /// Last factor.
+    pub to: f64,
+    /// Growth of the factor in a load step.
+    pub step: f64,
+    /// Greatest difference between the last factor with equilibrium and the first without.
+    pub tolerance: f64,
+    /// Whether flow becomes associated (Davis 1968).
+    pub davis: bool,
 }
 
 impl<const D: usize> Stage<D> {
@@ -426,6 +448,7 @@ impl<const D: usize> Stage<D> {
             leaving: None,
             at_rest: false,
             reset_displacement: false,
+            reduction: None,
         }
     }
 }

@@ -20,6 +20,7 @@
 //! | `hardening/` | strength as a function of plastic strain, rate and temperature |
 //! | `shock.rs` | artificial viscosity |
 //! | `root.rs` | roots of scalar equations, lane by lane |
+//! | `strength.rs` | strength over a factor of safety |
 //! | `tangent.rs` | derivatives of the stress by the deformation |
 //! | `tensor/` | symmetric tensors of batches: eigenvalues, logarithm, exponential |
 //! | `undrained.rs` | water that cannot leave the pores of a solid |
@@ -43,6 +44,7 @@ mod root;
 mod shock;
 mod solid;
 mod state;
+mod strength;
 mod tangent;
 pub(crate) mod tensor;
 #[cfg(test)]
@@ -57,6 +59,7 @@ pub use parameters::Parameters;
 pub use shock::{SHOCK_SUMS, Shock, Viscosity};
 use state::OWN;
 pub use state::{HISTORIES, PLASTIC_STRAIN, PLASTIC_VOLUME, State, Step};
+pub use strength::Weakened;
 pub use tangent::Tangent;
 pub use tensor::eigen::{self, Symmetric};
 

@@ -8,6 +8,7 @@ use super::{Run, RunError, restart, scene};
 use crate::io::picture;
 use crate::io::snapshot::{PointField, Scalars, ShownWater, View};
 use crate::job::Problem;
+use crate::particle::followed::Motion;
 use crate::solver::Solver;
 use crate::solver::state::phases::Phase;
 
@@ -24,6 +25,11 @@ impl<const D: usize> Run<'_, D> {
         let usual = match plastic {
             _ if has("damage") => PointField::Damage,
             true => PointField::PlasticStrain,
+            // Between load steps all is at rest.
+            false if problem.quasi_static.is_some() => match problem.output.followed.motion {
+                Motion::Nothing => PointField::VonMises,
+                Motion::Displacement | Motion::Strain => PointField::Displacement,
+            },
             false => PointField::Speed,
         };
         let field = problem.output.picture_field.unwrap_or(usual);

@@ -46,7 +46,7 @@ const COLUMNS: [Column<'static>; 20] = [
 
 /// Names and units of the columns after the step. Parts of a job add their own in this order: splits and
 /// merges of dynamic refinement; the work of the shift of fluids; work and heat of artificial viscosity; the
-/// progress towards equilibrium; the number of the stage, from 1; sources; failed particles; water in the
+/// progress towards equilibrium; effort of load steps, and the factor over which the strength is; the number of the stage, from 1; sources; failed particles; water in the
 /// pores; loads; contacts between bodies; probes; tracks; fluxes; faces of the domain, and the thrust of the
 /// water on them; colliders, each with that on it.
 pub fn columns<const D: usize>(problem: &Problem<D>) -> Vec<(String, &'static str)> {
@@ -66,6 +66,9 @@ pub fn columns<const D: usize>(problem: &Problem<D>) -> Vec<(String, &'static st
     }
     if problem.quasi_static.is_some() {
         columns.extend(EFFORT.map(|name| (name.to_owned(), "")));
+    }
+    if problem.has_reduction() {
+        columns.push(("strength_factor".to_owned(), ""));
     }
     if problem.stages.len() > 1 {
         columns.push(("stage".to_owned(), ""));
@@ -177,7 +180,7 @@ const EFFORT: [&str; 4] = ["newton_iterations", "linear_iterations", "unbalanced
 
 /// The values of a row for the last load step.
 pub fn effort_values(effort: &Effort) -> [f64; EFFORT.len()] {
-    let Effort { newton, linear, residual, cuts } = *effort;
+    let Effort { newton, linear, residual, cuts, .. } = *effort;
     [newton.into(), linear.into(), residual, cuts.into()]
 }
 

@@ -33,6 +33,7 @@ use std::time::{Duration, Instant};
 use partition::comm::{Comm, Disagreement};
 
 use self::at_end::ending::Ending;
+use self::at_end::safety::Safety;
 use self::at_end::{collapse, ending, report};
 use self::claim::Claim;
 use self::cores::Cores;
@@ -206,7 +207,12 @@ impl<'a, const D: usize> Run<'a, D> {
                 self.next_stage()?;
             }
             let requests = Requests { stop: stop.is_set(), checkpoint: self.schedule.wall_due() };
+            let before = self.solver.clock.step;
             let granted = self.step(requests)?.granted;
+            if self.solver.clock.step == before {
+                // The last step of a search for the factor of safety leaves the state as it is.
+                continue;
+            }
             self.solver.regrid().map_err(|source| self.step_error(source))?;
             self.write_due(granted.checkpoint)?;
             if granted.stop {
@@ -248,7 +254,8 @@ impl<'a, const D: usize> Run<'a, D> {
     /// Not collective. Whether the run has reached its end; the same on all ranks.
     fn is_over(&self) -> bool {
         let is_last = self.solver.physics.stage() + 1 == self.problem.stages.len();
-        self.solver.clock.time >= self.problem.time.end || is_last && self.stage_is_over()
+        let is_found = self.solver.factor_without_equilibrium().is_some();
+        self.solver.clock.time >= self.problem.time.end || is_found || is_last && self.stage_is_over()
     }
 
     /// Collective. Ends the stage under way with an output and a row of the history, and begins the next one.
@@ -292,6 +299,12 @@ impl<'a, const D: usize> Run<'a, D> {
                  fall, particles that cross cells keep them up: expect no less, or use finer cells"
             ));
         }
+    }
+
+    /// Not collective. Tells the user the factor of safety, in a stage that looks for it.
+    fn tell_safety(&mut self) {
+        let Some(safety) = Safety::of(&self.solver) else { return };
+        self.recorder.message(&safety.to_string());
     }
 
     /// Collective. Warns of sources whose material came where other material lay.
@@ -420,6 +433,7 @@ impl<'a, const D: usize> Run<'a, D> {
         self.recorder.recall_row(self.comm, &mut self.solver)?;
         self.recorder.finish(self.comm, &self.solver);
         self.tell_equilibrium();
+        self.tell_safety();
         self.tell_missed_stages();
         self.tell_blocked_sources();
         self.tell_unsettled_heads();
@@ -441,6 +455,7 @@ impl<'a, const D: usize> Run<'a, D> {
             last_output: self.outputs.last(),
             series: self.outputs.series().to_owned(),
             picture,
+            is_still: self.problem.quasi_static.is_some(),
             collapse,
         };
         self.recorder.report(&self.solver, &summary);

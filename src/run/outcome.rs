@@ -60,6 +60,8 @@ pub struct Summary {
     pub series: PathBuf,
     /// Picture of the last state, or why there is none; `Ok(None)` if the job wants none.
     pub picture: Result<Option<PathBuf>, String>,
+    /// Whether all is at rest in outputs, as between load steps.
+    pub is_still: bool,
     /// Evaluation that the job asks for.
     pub collapse: Option<Collapse>,
 }

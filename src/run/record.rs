@@ -5,6 +5,7 @@ use std::time::Instant;
 use partition::comm::{Comm, Traffic};
 
 use super::at_end::report::{self, Report};
+use super::at_end::safety::Safety;
 use super::measures::lines;
 use super::{Effort, Options, RunError, Summary, history};
 use crate::io::hdf5_file::FileError;
@@ -145,6 +146,10 @@ impl<'a, const D: usize> Recorder<'a, D> {
             self.write(comm, solver, row, record)?;
         }
         self.prepare(solver);
+        if self.problem.quasi_static.is_some() {
+            let effort = solver.equilibrium.effort;
+            self.progress.effort(effort.newton, effort.linear, effort.residual);
+        }
         self.progress.step(step, solver.clock.time, solver.clock.dt);
         Ok(())
     }
@@ -295,6 +300,9 @@ impl<'a, const D: usize> Recorder<'a, D> {
         if self.problem.quasi_static.is_some() {
             values.extend(history::effort_values(&solver.equilibrium.effort));
         }
+        if self.problem.has_reduction() {
+            values.push(solver.physics.strength_factor(clock.time));
+        }
         if self.problem.stages.len() > 1 {
             values.push((solver.physics.stage() + 1) as f64);
         }
@@ -434,6 +442,7 @@ impl<'a, const D: usize> Recorder<'a, D> {
             particles: self.particles(),
             history: columns.map(entry).collect(),
             stages: stages.map(|(stage, start)| (stage.name.clone(), *start)).collect(),
+            factor_of_safety: Safety::of(solver),
             column_collapse: summary.collapse.as_ref().map(Into::into),
             outputs: summary.series.clone(),
             picture: summary.picture.clone().ok().flatten(),

@@ -26,6 +26,7 @@ pub(super) fn constant_physics<const D: usize>(problem: &Problem<D>) -> Physics<
         leaving: problem.leaving,
         equilibrium: None,
         quasi_static: problem.quasi_static,
+        reduction: None,
         fill_densities: Vec::new(),
         meets: Vec::new(),
         transfer: problem.transfer,

@@ -9,8 +9,10 @@ use super::walls;
 use crate::adaptivity::Cohesion;
 use crate::boundary::{ActsOn, Meets};
 use crate::job::Problem;
-use crate::job::problem::{Body, BoxPolicy, Coordinates};
+use crate::job::problem::{Body, BoxPolicy, Coordinates, FactorSearch, MaterialSetup};
+use crate::material::Weakened;
 use crate::particle::chunk::{Chunk, Layout, Tag};
+use crate::solver::physics::StrengthReduction;
 use crate::solver::stage::Change;
 use crate::solver::{Physics, Solver};
 
@@ -32,6 +34,10 @@ pub fn physics<const D: usize>(problem: &Problem<D>, starts: &[f64]) -> Physics<
         }
         physics.leaving = stage.leaving.unwrap_or(physics.leaving);
         physics.equilibrium = stage.equilibrium;
+        physics.reduction = stage.reduction.map(|search| reduction(problem, &search));
+    }
+    if let (Some(load_steps), Some(reduction)) = (&mut physics.quasi_static, &physics.reduction) {
+        (load_steps.step, load_steps.least_step) = (reduction.step, reduction.tolerance);
     }
     physics.stage_starts = starts.to_vec();
     let stage = physics.stage();
@@ -58,6 +64,18 @@ pub fn physics<const D: usize>(problem: &Problem<D>, starts: &[f64]) -> Physics<
     physics.meets = fields.map(|field| meets(problem, field as u8, stage)).collect();
     physics.cohesion = cohesion(problem, stage);
     physics
+}
+
+/// The materials whose strength falls in a stage.
+fn reduction<const D: usize>(problem: &Problem<D>, search: &FactorSearch) -> StrengthReduction {
+    let FactorSearch { from, step, tolerance, davis, .. } = *search;
+    let weakened = |setup: &MaterialSetup| Weakened {
+        model: setup.model.clone(),
+        undrained: setup.undrained,
+        density: setup.density,
+        davis,
+    };
+    StrengthReduction { from, step, tolerance, materials: problem.materials.iter().map(weakened).collect() }
 }
 
 /// How elastic bodies of a stage hold together, if there are any and boxes follow the deformation. Sections of

@@ -64,6 +64,7 @@ impl<const D: usize> Solver<D> {
     ) -> Self {
         let start = thread_time();
         physics.deform_colliders(clock.time);
+        physics.weaken(clock.time);
         let grid = Grid::build(comm, &forest, &physics, 0);
         let partitioned = LastPartition::at_start(start);
         let mut solver = Self {
@@ -145,6 +146,11 @@ impl<const D: usize> Solver<D> {
             Some(_) => {
                 let (whole, start) = (dt, self.clock.time);
                 let (dt, advanced) = self.load_step(dt);
+                if dt == 0.0 && advanced.is_ok() {
+                    // The state stays that of the last factor with equilibrium.
+                    self.clock.bound = self.equilibrium.next_load_step;
+                    return Ok(StepReport::default());
+                }
                 (if dt < whole { start + dt } else { to }, dt, advanced)
             }
         };

@@ -6,7 +6,7 @@ use crate::boundary::absorbing::AbsorbingFaces;
 use crate::boundary::{BodyContacts, Collider, Contact, Leaving, Meets};
 use crate::kernel::{BoxPolicy, Coordinates, Scheme, Transfer};
 use crate::load::{self, Gravity, Load, Seepage, Water};
-use crate::material::{Failed, Material, Viscosity};
+use crate::material::{Failed, Material, Viscosity, Weakened};
 use crate::particle::chunk::{Chunk, Layout, Tag};
 use crate::particle::followed::{FirstColumns, Followed};
 use crate::particle::group::Group;
@@ -67,6 +67,8 @@ pub struct Physics<const D: usize> {
     pub equilibrium: Option<Equilibrium>,
     /// Load steps to equilibrium in place of time steps; `None`: none.
     pub quasi_static: Option<QuasiStatic>,
+    /// Strength that falls during the stage; `None`: it stays.
+    pub reduction: Option<StrengthReduction>,
     /// How particle boxes follow the deformation.
     pub boxes: BoxPolicy,
     /// How elastic bodies hold together that are stretched; `None`: their particles are not halved.
@@ -120,6 +122,19 @@ pub struct QuasiStatic {
     pub tolerance: f64,
 }
 
+/// Strength that is divided by a factor that grows by 1 in 1 s, up to that without equilibrium.
+#[derive(Clone, Debug)]
+pub struct StrengthReduction {
+    /// The factor at the start of the stage.
+    pub from: f64,
+    /// Growth of the factor in a load step, until one fails.
+    pub step: f64,
+    /// Greatest difference between the last factor with equilibrium and the first without.
+    pub tolerance: f64,
+    /// The materials, by index.
+    pub materials: Vec<Weakened>,
+}
+
 /// Limits on the time step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StepControl {
@@ -135,6 +150,20 @@ impl<const D: usize> Physics<D> {
     /// Whether particles of any material go when they fail.
     pub(crate) fn can_fail(&self) -> bool {
         self.failed.iter().any(|rule| *rule != Failed::Stays)
+    }
+
+    /// The factor that divides the strength at a time, s, of the stage under way.
+    pub fn strength_factor(&self, time: f64) -> f64 {
+        let begun = self.stage_starts.last().copied().unwrap_or(0.0);
+        self.reduction.as_ref().map_or(1.0, |reduction| reduction.from + (time - begun))
+    }
+
+    /// Gives the materials the strength of a time, s, in a stage that reduces it.
+    pub(crate) fn weaken(&mut self, time: f64) {
+        let factor = self.strength_factor(time);
+        if let Some(reduction) = &self.reduction {
+            self.materials = reduction.materials.iter().map(|material| material.over(factor)).collect();
+        }
     }
 
     /// Number of the stage under way, from 0.

@@ -50,6 +50,10 @@ impl<const D: usize> Solver<D> {
         let before = std::mem::replace(&mut self.physics, physics);
         self.physics.has_halves = before.has_halves;
         self.physics.deform_colliders(self.clock.time);
+        self.physics.weaken(self.clock.time);
+        if let Some(reduction) = &self.physics.reduction {
+            self.equilibrium.next_load_step = reduction.step;
+        }
         for (index, collider) in self.physics.colliders.iter().enumerate() {
             if collider.is_present() && !before.colliders[index].is_present() {
                 self.contacts.states[index] = collider.state_at(self.clock.time);

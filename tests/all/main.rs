@@ -17,6 +17,7 @@ mod documentation;
 mod equilibrium;
 mod extending;
 mod faces;
+mod factor_of_safety;
 mod fluids;
 mod footing;
 mod free_bodies;

@@ -103,7 +103,13 @@ pub(in crate::cli) fn write<const D: usize>(
                 true => format!("at most {}", quantity(stage.duration, "s")),
                 false => "to the end of the run".to_owned(),
             };
-            let until = if stage.equilibrium.is_some() { "to equilibrium, " } else { "" };
+            let until = match (&stage.reduction, stage.equilibrium) {
+                (Some(search), _) => {
+                    format!("strength over {} to {}, ", number(search.from, 4), number(search.to, 4))
+                }
+                (None, Some(_)) => "to equilibrium, ".to_owned(),
+                (None, None) => String::new(),
+            };
             writeln!(out, "  {:18} {until}{duration}", excerpt(&stage.name, NAME))?;
         }
     }

@@ -45,6 +45,8 @@ pub struct Progress {
     shown: Option<Instant>,
     known: Known,
     warnings: usize,
+    /// How the last load step went, in words; empty without load steps.
+    effort: String,
     /// When the mean of the speed began, and at which step.
     since: Option<(Instant, u64)>,
     /// Steps per second.
@@ -75,6 +77,7 @@ impl Progress {
             shown: None,
             known: Known::default(),
             warnings,
+            effort: String::new(),
             since: None,
             speed: None,
         }
@@ -101,6 +104,12 @@ impl Progress {
             memory: record.memory.mean * record.ranks as f64,
             words,
         };
+    }
+
+    /// How the load step that is done went: Newton and linear iterations, and the unbalanced force over that of
+    /// loads or stress.
+    pub fn effort(&mut self, newton: u32, linear: u32, unbalanced: f64) {
+        self.effort = format!("  {newton} Newton, {linear} linear iterations, unbalanced {unbalanced:.1e}");
     }
 
     /// After each step; shows it now and then.
@@ -135,7 +144,9 @@ impl Progress {
                     known: &self.known,
                     warnings: self.warnings,
                 };
-                bar.set_message(row.fit(columns));
+                let effort: String = self.effort.trim_start().chars().take(columns).collect();
+                let line = if effort.is_empty() { "" } else { "\n" };
+                bar.set_message(format!("{}{line}{effort}", row.fit(columns)));
             }
             // A closed pipe must not end the run.
             Display::Lines(out) => drop(writeln!(out, "{text}")),
@@ -163,6 +174,7 @@ impl Progress {
         let left = left.map_or_else(|| "?".to_owned(), clock);
         let (time, dt) = (quantity_to(time, "s", 5), quantity(dt, "s"));
         let mut text = format!("{:5.1} %  step {step}  t = {time}  dt = {dt}  ETA {left}", 100.0 * done);
+        text.push_str(&self.effort);
         if !self.known.words.is_empty() {
             text.push_str("  ");
             text.push_str(&self.known.words);

@@ -3,8 +3,9 @@ use super::checks::Checks;
 use super::{loads, settings};
 use crate::job::parse::error::QUOTED;
 use crate::job::parse::source::Path;
-use crate::job::problem::{InStages, Stage};
+use crate::job::problem::{FactorSearch, InStages, Stage};
 use crate::job::schema::job_file::{Body, Equilibrium as Written, JobFile};
+use crate::job::schema::stages::StrengthReduction;
 use crate::particle::followed::Motion;
 use crate::solver::Equilibrium;
 use crate::text::{excerpt, written as number};
@@ -69,6 +70,7 @@ fn stage<const D: usize>(checks: &mut Checks, file: &JobFile, index: usize, path
             format!("found a stage that begins at {begins} s; expected it before time.end = {end} s");
         checks.fault(path, message);
     }
+    let reduction = strength_reduction(checks, file, index, path);
     let bodies = || file.body_names().into_iter();
     let materials_known = || file.materials.iter().map(|material| material.name.as_str());
     let mut removed = Vec::new();
@@ -104,7 +106,10 @@ fn stage<const D: usize>(checks: &mut Checks, file: &JobFile, index: usize, path
     let leaving = written.boundaries.as_ref().and_then(|boundaries| boundaries.leaving);
     Some(Stage {
         name: written.name.clone(),
-        duration: written.duration.unwrap_or(f64::INFINITY),
+        duration: reduction
+            .map(|search| search.to - search.from)
+            .or(written.duration)
+            .unwrap_or(f64::INFINITY),
         equilibrium: equilibrium(file, written.equilibrium.as_ref()),
         removed,
         materials,
@@ -114,7 +119,50 @@ fn stage<const D: usize>(checks: &mut Checks, file: &JobFile, index: usize, path
         leaving: leaving.map(settings::leaving),
         at_rest: written.at_rest,
         reset_displacement: written.reset_displacement,
+        reduction,
     })
+}
+
+/// Search for the factor of safety in a stage, or faults.
+fn strength_reduction(
+    checks: &mut Checks,
+    file: &JobFile,
+    index: usize,
+    path: &Path,
+) -> Option<FactorSearch> {
+    let stage = &file.stages[index];
+    let StrengthReduction { from, to, step, tolerance, davis } = *stage.strength_reduction.as_ref()?;
+    let here = path.key("strength_reduction");
+    let mut fault = |path: &Path, message: String| checks.fault(path, message);
+    if file.quasi_static.is_none() {
+        let message = "found it in a job without load steps; expected [quasi_static], or a sweep over the strength_factor of a material";
+        fault(&here, message.into());
+    }
+    if index + 1 < file.stages.len() {
+        fault(
+            &here,
+            "found it before the last stage; expected it in the last one: the run ends with it".into(),
+        );
+    }
+    if let Some(duration) = stage.duration {
+        let message = format!(
+            "found {} s in a stage with strength_reduction; expected none: it ends with the factor of safety",
+            number(duration)
+        );
+        fault(&path.key("duration"), message);
+    }
+    if to <= from {
+        fault(&here.key("to"), format!("found {}; expected more than from = {}", number(to), number(from)));
+    }
+    if tolerance > step {
+        let message = format!("found {}; expected at most step = {}", number(tolerance), number(step));
+        fault(&here.key("tolerance"), message);
+    }
+    if file.materials.iter().all(|material| material.model.weakened(1.0).is_none()) {
+        let message = "found no material with cohesion, yield stress or friction; expected mohr_coulomb, drucker_prager, tresca or von_mises";
+        fault(&here, message.into());
+    }
+    Some(FactorSearch { from, to, step, tolerance, davis })
 }
 
 /// Number of a stage by its name, or a fault.

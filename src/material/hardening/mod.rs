@@ -286,7 +286,7 @@ impl Hardening {
     }
 
     /// Whether it needs the history variable of the temperature.
-    fn heats(&self) -> bool {
+    pub(super) fn heats(&self) -> bool {
         matches!(self, Self::Law(HardeningLaw::JohnsonCook { .. }))
     }
 }

@@ -183,6 +183,23 @@ impl Model for DruckerPrager {
         })
     }
 
+    fn associated(p: &Parameters) -> Parameters {
+        let share = angle::davis(p.friction_angle, p.dilation_angle);
+        if share == 1.0 {
+            return p.clone();
+        }
+        let friction_angle = angle::weakened(p.friction_angle, 1.0 / share);
+        Parameters {
+            friction_angle,
+            cohesion: share * p.cohesion,
+            dilation_angle: friction_angle,
+            hardening: p.hardening.weakened(1.0 / share),
+            // Temperature and volume gain share one history variable.
+            volume_correction: p.volume_correction && !p.hardening.heats(),
+            ..p.clone()
+        }
+    }
+
     fn examples() -> &'static [&'static str] {
         &[
             "model = 'drucker_prager', young = 1e6, poisson = 0.3, friction_angle = 30",

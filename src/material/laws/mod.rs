@@ -82,6 +82,13 @@ macro_rules! materials {
                 }
             }
 
+            /// The same model with associated flow, and the strength that goes with it.
+            pub fn associated(&self) -> Self {
+                match self {
+                    $(Self::$name(own) => Self::$name(<$law as Model>::associated(own)),)*
+                }
+            }
+
             /// Every model with the parameters of its examples.
             pub fn examples() -> Vec<&'static str> {
                 [$(<$law as Model>::examples(),)*].concat()
@@ -166,6 +173,14 @@ mod tests {
                 let [before_tan, after_tan] = [before, after].map(|p| p.friction_angle.to_radians().tan());
                 assert!((1.5 * after_tan / before_tan - 1.0).abs() < 1e-14, "{text}");
                 assert_eq!(after.cohesion, before.cohesion / 1.5);
+            }
+            let associated = weaker.associated();
+            assert!(associated.check().is_ok(), "{text}");
+            if let Parameters::MohrCoulomb(p) = &associated {
+                assert!(
+                    p.dilation_angle == p.friction_angle || p.residual_friction_angle.is_some(),
+                    "{text}"
+                );
             }
             weakened += 1;
         }

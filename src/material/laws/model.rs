@@ -35,6 +35,12 @@ pub trait Model: Law {
         None
     }
 
+    /// The parameters with associated flow, and with cohesion and friction so much less that the strength is
+    /// about the same (Davis 1968). Models whose flow is associated keep theirs.
+    fn associated(parameters: &Self::Parameters) -> Self::Parameters {
+        parameters.clone()
+    }
+
     /// Sets of parameters, in the form of a job file, that together cover every branch of the law: for tests
     /// and benches. Strengths are such that some percent of strain makes it flow; densities are 1000 kg/m³.
     fn examples() -> &'static [&'static str];

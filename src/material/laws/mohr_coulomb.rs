@@ -176,6 +176,28 @@ impl Model for MohrCoulomb {
         })
     }
 
+    fn associated(p: &Parameters) -> Parameters {
+        let share = angle::davis(p.friction_angle, p.dilation_angle);
+        if share == 1.0 {
+            return p.clone();
+        }
+        let friction_angle = angle::weakened(p.friction_angle, 1.0 / share);
+        let residual_friction_angle =
+            p.residual_friction_angle.map(|angle| angle::weakened(angle, 1.0 / share));
+        Parameters {
+            friction_angle,
+            residual_friction_angle,
+            cohesion: share * p.cohesion,
+            dilation_angle: friction_angle,
+            residual_dilation_angle: residual_friction_angle,
+            flow: FlowRule::Pyramid,
+            hardening: p.hardening.weakened(1.0 / share),
+            // Temperature and volume gain share one history variable.
+            volume_correction: p.volume_correction && !p.hardening.heats(),
+            ..p.clone()
+        }
+    }
+
     fn examples() -> &'static [&'static str] {
         &[
             "model = 'mohr_coulomb', young = 1e6, poisson = 0.3, friction_angle = 30",

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 
 use super::collapse::Collapse;
+use super::safety::Safety;
 use crate::io::hdf5_file::FileError;
 use crate::io::whole_file::write_whole;
 
@@ -37,6 +38,8 @@ pub struct Report {
     pub particles: u64,
     /// Last row of the history: value and unit by name of the column; no value where it is not a number.
     pub history: BTreeMap<String, (Option<f64>, String)>,
+    /// The factor of safety, if a stage looks for it.
+    pub factor_of_safety: Option<Safety>,
     /// Evaluation of a column collapse.
     pub column_collapse: Option<ColumnCollapse>,
     /// Messages during the run.

@@ -91,6 +91,7 @@ impl<const D: usize> GivenBoxes<D> {
         let physics = Physics {
             equilibrium: None,
             quasi_static: None,
+            reduction: None,
             fill_densities: Vec::new(),
             meets: Vec::new(),
             origin: [0.0; D],

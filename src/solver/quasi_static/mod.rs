@@ -12,11 +12,13 @@
 //! | `skyline` | factors of a symmetric matrix |
 //! | `coarse` | preconditioner: leaves as elements |
 //! | `newton` | the iteration |
+//! | `strength` | the search for a factor of safety |
 //! | this | a step |
 mod coarse;
 mod newton;
 mod points;
 mod skyline;
+mod strength;
 mod unknowns;
 
 use self::newton::MOST_WAY;
@@ -55,19 +57,17 @@ impl<const D: usize> Solver<D> {
             return (dt, sorted.map(|()| Moved::default()).map_err(Into::into));
         }
         let (mut dt, mut cuts) = (dt, 0);
-        let masses: Vec<Vec<f64>> = self
-            .chunks
-            .iter()
-            .map(|chunk| chunk.column(Layout::<D>::MASS).into_iter().copied().collect())
-            .collect();
+        let masses = columns(&self.chunks, Layout::<D>::MASS);
+        let hoops = columns(&self.chunks, Layout::<D>::STRESS + 2);
         loop {
+            self.physics.weaken(self.clock.time + dt);
             let rates = self.collider_rates(dt);
             let (unknowns, outer, pulls) = self.outer_forces(&rates, dt);
             if let Some(face) = self.open_face(&unknowns) {
                 return (dt, Err(StepError::Face { face }));
             }
             let found = self.balance_forces(&unknowns, &outer, dt, settings.tolerance);
-            restore_masses(&mut self.chunks, &masses);
+            restore(&mut self.chunks, Layout::<D>::MASS, &masses);
             match found {
                 Ok(balance) => {
                     let effort = Effort { cuts, ..balance.effort };
@@ -78,19 +78,31 @@ impl<const D: usize> Solver<D> {
                     // Nodes of a longer step than the next may move too far.
                     let far = self.comm.max_f64(unknowns.greatest_way(&balance.way));
                     let allowed = if far > 0.0 { NEARLY * MOST_WAY / far * dt } else { f64::INFINITY };
-                    self.equilibrium.next_load_step = grown.min(allowed).min(settings.step);
+                    self.equilibrium.next_load_step = match &self.physics.reduction {
+                        Some(reduction) => reduction.next(bound, dt),
+                        None => grown.min(allowed).min(settings.step),
+                    };
                     let impulses = self.book(&unknowns, &balance.rest, &balance.way, &pulls, dt);
                     return (dt, self.follow(&unknowns, &balance.way, &rates, impulses, dt));
                 }
                 Err(effort) => {
                     cuts += 1;
                     dt *= 0.5;
-                    if dt < settings.least_step {
-                        let Effort { newton, linear, residual, .. } = effort;
+                    if let Some(reduction) = &self.physics.reduction {
+                        if reduction.is_bracket(2.0 * dt) {
+                            self.equilibrium.next_load_step = dt;
+                            self.physics.weaken(self.clock.time);
+                            restore(&mut self.chunks, Layout::<D>::STRESS + 2, &hoops);
+                            self.chunks.iter_mut().for_each(stop);
+                            return (0.0, Ok(Moved::default()));
+                        }
+                    } else if dt < settings.least_step {
+                        let Effort { newton, linear, residual, worst, .. } = effort;
+                        let place = (0..D).map(|a| self.physics.origin[a] + worst[a]).collect();
                         let to = self.clock.time + 2.0 * dt;
                         return (
                             dt,
-                            Err(StepError::NoBalance { to, dt: 2.0 * dt, newton, linear, residual }),
+                            Err(StepError::NoBalance { to, dt: 2.0 * dt, newton, linear, residual, place }),
                         );
                     }
                 }
@@ -227,11 +239,16 @@ impl<const D: usize> Solver<D> {
     }
 }
 
-/// Gives particles their masses back.
-fn restore_masses<const D: usize>(chunks: &mut [Chunk<D>], masses: &[Vec<f64>]) {
-    for (chunk, masses) in chunks.iter_mut().zip(masses) {
-        for (mass, &own) in chunk.column_mut(Layout::<D>::MASS).into_iter().zip(masses) {
-            *mass = own;
+/// The values of a column of all particles, by leaf.
+fn columns<const D: usize>(chunks: &[Chunk<D>], column: usize) -> Vec<Vec<f64>> {
+    chunks.iter().map(|chunk| chunk.column(column).into_iter().copied().collect()).collect()
+}
+
+/// Gives particles the values of a column back.
+fn restore<const D: usize>(chunks: &mut [Chunk<D>], column: usize, values: &[Vec<f64>]) {
+    for (chunk, values) in chunks.iter_mut().zip(values) {
+        for (value, &own) in chunk.column_mut(column).into_iter().zip(values) {
+            *value = own;
         }
     }
 }

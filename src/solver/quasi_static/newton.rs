@@ -71,6 +71,7 @@ impl<const D: usize> Solver<D> {
                 return Ok(Balance { effort, way, rest });
             }
             if effort.newton == ITERATIONS {
+                effort.worst = unknowns.worst(&self.comm, &now.free);
                 return Err(effort);
             }
             effort.newton += 1;
@@ -110,7 +111,10 @@ impl<const D: usize> Solver<D> {
                     break None;
                 }
             };
-            let Some(next) = next else { return Err(effort) };
+            let Some(next) = next else {
+                effort.worst = unknowns.worst(&self.comm, &now.free);
+                return Err(effort);
+            };
             held_is_reached |= share == 1.0;
             let fall = next.norm / now.norm;
             forcing = if fall.is_finite() { (0.9 * fall * fall).clamp(1e-4, FORCING[1]) } else { FORCING[0] };

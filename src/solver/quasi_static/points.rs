@@ -9,6 +9,9 @@
 //! ```
 //! with δτ by the tangent of the law. F-bar is a projection of ΔF; the same projection of P is its adjoint, so
 //! the stiffness of an elastic body is symmetric with it as well.
+//!
+//! While the strength is reduced, forces balance on the shape of the start: `P = τ`, and ΔF is `1 + ε` with the
+//! symmetric part ε of the gradients.
 use rayon::prelude::*;
 
 use crate::grid::leaf_geometry::{LeafCells, leaf_box};
@@ -35,16 +38,24 @@ pub(super) struct Points {
     inverse: Matrix,
     /// Derivative of the stress.
     tangent: Tangent,
+    /// Whether forces balance on the shape of the start.
+    keeps_shape: bool,
 }
 
 impl Points {
     /// First Piola-Kirchhoff stress on the body at the start of the step, per undeformed volume, Pa.
     fn force(&self) -> Matrix {
+        if self.keeps_shape {
+            return full(&self.stress);
+        }
         times_transposed(&full(&self.stress), &self.inverse)
     }
 
     /// Its change by a small further displacement with this gradient over the body at the start of the step.
     pub(super) fn change(&self, gradient: &Matrix) -> Matrix {
+        if self.keeps_shape {
+            return full(&self.tangent.change(&self.stress, &symmetric(gradient)));
+        }
         let further = product(gradient, &self.inverse);
         let mut change = full(&self.tangent.change(&self.stress, &further));
         let turned = times_transposed(&full(&self.stress), &further);
@@ -58,6 +69,11 @@ impl Points {
 fn full(tensor: &Symmetric) -> Matrix {
     let [xx, yy, zz, xy, xz, yz] = *tensor;
     [[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]
+}
+
+/// The symmetric part.
+fn symmetric(a: &Matrix) -> Matrix {
+    std::array::from_fn(|i| std::array::from_fn(|k| (a[i][k] + a[k][i]) * 0.5))
 }
 
 fn product(a: &Matrix, b: &Matrix) -> Matrix {
@@ -159,7 +175,8 @@ impl<const D: usize> Solver<D> {
                 let mut is_sound = true;
                 if let Sweep::Deform { dt } = sweep {
                     let step = Step { dt, cell: plan.finest_cell(leaf), ..Step::rest(D == 2) };
-                    is_sound = deform(chunk, &scheme, &step, gradients, points);
+                    let keeps_shape = physics.reduction.is_some();
+                    is_sound = deform(chunk, &scheme, (&step, keeps_shape), gradients, points);
                 }
                 for (number, points) in points.iter().enumerate() {
                     let first = number * LANES;
@@ -214,7 +231,7 @@ fn project<const D: usize>(
 fn deform<const D: usize>(
     chunk: &mut Chunk<D>,
     scheme: &Scheme<'_>,
-    step: &Step,
+    (step, keeps_shape): (&Step, bool),
     gradients: &[([[f64; D]; D], f64)],
     points: &mut Vec<Points>,
 ) -> bool {
@@ -235,6 +252,9 @@ fn deform<const D: usize>(
             Lanes::new(std::array::from_fn(|lane| values[lane.min(last)]))
         };
         let mut deformation = batch_of(gradients, first);
+        if keeps_shape {
+            deformation = symmetric(&deformation);
+        }
         (0..3).for_each(|i| deformation[i][i] += Lanes::splat(1.0));
         let (inverse, determinant) = inverse(&deformation);
         let mut elastic = [Lanes::splat(0.0); 6];
@@ -259,7 +279,7 @@ fn deform<const D: usize>(
         let sum = state.stress.iter().fold(tangent.greatest(), |sum, stress| sum + *stress);
         let most = Lanes::splat(f64::MAX);
         is_sound &= (Lanes::splat(0.0).lt(determinant) & sum.abs().le(most)).all();
-        points.push(Points { stress: state.stress, inverse, tangent });
+        points.push(Points { stress: state.stress, inverse, tangent, keeps_shape });
         tangent.greatest().store(&mut stiffness);
         for (lane, stiffness) in stiffness.iter().enumerate().take(last + 1) {
             let [half] = chunk.read(Layout::<D>::HALF, first + lane);

@@ -161,6 +161,21 @@ impl<const D: usize> Unknowns<D> {
         along.fold(0.0, f64::max)
     }
 
+    /// Collective. Place of the greatest of these forces, m; of equal ones the least coordinates.
+    pub(super) fn worst(&self, comm: &Comm, forces: &[[f64; D]]) -> [f64; 3] {
+        let square = |force: &[f64; D]| force.iter().map(|f| f * f).sum::<f64>();
+        let greatest = comm.max_f64(forces.iter().map(square).fold(0.0, f64::max));
+        let all = self.places.iter().zip(forces);
+        let mut worst: Vec<&[f64; D]> =
+            all.filter(|(_, force)| square(force) == greatest).map(|(x, _)| x).collect();
+        let mut place = [0.0; 3];
+        for a in 0..D {
+            place[a] = comm.min_f64(worst.iter().map(|x| x[a]).fold(f64::INFINITY, f64::min));
+            worst.retain(|x| x[a] == place[a]);
+        }
+        place
+    }
+
     /// Whether each node is tied.
     pub(super) fn tied(&self) -> Vec<bool> {
         let mut tied = vec![false; self.nodes.len()];

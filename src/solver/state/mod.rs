@@ -64,7 +64,8 @@ pub enum StepError {
     },
     /// Forces of a load step do not balance.
     #[error(
-        "no equilibrium at t = {to} s, in a load step of {dt} s, the shortest: after {newton} Newton and {linear} linear iterations {residual:.1e} of the forces were not balanced; expected loads that the material can bear, or a smaller quasi_static.min_step"
+        "no equilibrium at t = {to} s, in a load step of {dt} s, the shortest: after {newton} Newton and {linear} linear iterations {residual:.1e} of the forces were not balanced, most at {}; expected loads that the material can bear, or a smaller quasi_static.min_step",
+        crate::text::place(place)
     )]
     NoBalance {
         /// Time at the end of the step, s.
@@ -77,6 +78,8 @@ pub enum StepError {
         linear: u32,
         /// Unbalanced force over that of loads or stress.
         residual: f64,
+        /// Where most of it is, in the coordinates of the job, m.
+        place: Vec<f64>,
     },
     /// Material of a quasi-static job has come to a face that only bears pressure.
     #[error(

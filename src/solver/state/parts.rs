@@ -144,6 +144,9 @@ pub struct Effort {
     pub residual: f64,
     /// Attempts at the step that were given up.
     pub cuts: u32,
+    /// Place of the node with the greatest unbalanced force of an attempt that failed, m from the lower corner of
+    /// the domain.
+    pub worst: [f64; 3],
 }
 
 /// Mass of the particles, and on the real nodes, in one step, on one rank.
