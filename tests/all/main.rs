@@ -25,6 +25,7 @@ mod golden;
 mod hostile_files;
 mod initial_stress;
 mod io_files;
+mod load_step_tables;
 mod loads;
 mod materials;
 mod meshes;
