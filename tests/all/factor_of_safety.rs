@@ -1,5 +1,5 @@
-//! Claim: strength reduction by load steps finds factors of safety of limit analysis, the same on any ranks and across
-//! restarts, and the run ends with it as it should.
+//! Claim: strength reduction by load steps finds factors of safety of limit analysis, the same on any ranks
+//! and across restarts, and the run ends with it as it should.
 
 use std::path::Path;
 
@@ -15,7 +15,8 @@ fn factors(directory: &Path, name: &str) -> [Option<f64>; 2] {
     ["stands", "slides"].map(|key| report["factor_of_safety"][key].as_f64())
 }
 
-/// Log spirals (Chen 1975) with β = 26.565°, φ = 20°, c / (ρ g H) = 0.05: 1.368, on cells of a twentieth of the height.
+/// Log spirals (Chen 1975) with β = 26.565°, φ = 20°, c / (ρ g H) = 0.05: 1.368, on cells of a twentieth of
+/// the height.
 #[test]
 fn a_slope_has_the_factor_of_limit_analysis() {
     let directory = tempfile::tempdir().expect("temporary directory");
@@ -29,7 +30,8 @@ fn a_slope_has_the_factor_of_limit_analysis() {
     assert!(text(&output).contains("factor of safety 1."), "{}", text(&output));
 }
 
-/// A vertical cut in clay with N = ρ g H / c = 2 without friction: bounds of 3.78 / N. Cells are a tenth of its height.
+/// A vertical cut in clay with N = ρ g H / c = 2 without friction: bounds of 3.78 / N. Cells are a tenth of
+/// its height.
 const CUT: &str = r#"
 version = 1
 dimension = 2
@@ -102,8 +104,9 @@ fn a_search_tells_when_its_factors_are_too_low_or_too_high() {
     }
 }
 
-/// Ground with a coefficient of earth pressure at rest is in equilibrium to rounding; then a pit is dug in two stages, and its wall
-/// has the factor of Chen's critical height (1975), 1.61, less what flow that is not associated takes.
+/// Ground with a coefficient of earth pressure at rest is in equilibrium to rounding; then a pit is dug in
+/// two stages, and its wall has the factor of Chen's critical height (1975), 1.61, less what flow that is
+/// not associated takes.
 #[test]
 fn a_pit_is_dug_from_ground_at_rest_and_has_its_factor() {
     let directory = tempfile::tempdir().expect("temporary directory");

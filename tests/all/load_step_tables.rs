@@ -1,5 +1,5 @@
-//! Claim: load steps agree with finite elements and closed forms of bodies that yield: a block under its weight, a
-//! notched bar, a sphere under inner pressure.
+//! Claim: load steps agree with finite elements and closed forms of bodies that yield: a block under its
+//! weight, a notched bar, a sphere under inner pressure.
 
 use crate::common::history::History;
 use crate::common::launch::{run, succeed};
@@ -73,8 +73,8 @@ fn a_block_under_its_weight_is_that_of_finite_elements() {
     }
 }
 
-/// A bar with a round notch, a quarter of it, pulled beyond yield: 16 cells across half of the ligament. It is stiff, as
-/// the finite elements are for small strains.
+/// A bar with a round notch, a quarter of it, pulled beyond yield: 16 cells across half of the ligament. It
+/// is stiff, as the finite elements are for small strains.
 const BAR: &str = r#"
 version = 1
 dimension = 2
@@ -117,8 +117,8 @@ picture = false
 every_steps = 1
 "#;
 
-/// Forces of finite elements with 8 nodes at 0.4, 0.8 and 1.2 mm. The last in plane strain is 1.0004 of Hill's value for slip
-/// lines.
+/// Forces of finite elements with 8 nodes at 0.4, 0.8 and 1.2 mm. The last in plane strain is 1.0004 of
+/// Hill's value for slip lines.
 #[test]
 fn a_notched_bar_bears_what_finite_elements_say() {
     let revolution = BAR.replace("dimension = 2", "dimension = 2\ngeometry = \"axisymmetric\"");
@@ -181,7 +181,8 @@ fn a_sphere_under_inner_pressure_yields_as_the_closed_form_says() {
     for (time, work) in times.iter().zip(works).skip(1) {
         way += (work - before) / (2.0 * std::f64::consts::PI * 25.2e3 * time);
         before = *work;
-        // Radius up to which it has yielded, from the displacement: u = Y (1 - ν) c³ / (E a²) less the elastic dilation.
+        // Radius up to which it has yielded, from the displacement: u = Y (1 - ν) c³ / (E a²) less the
+        // elastic dilation.
         let plastic = |c: f64| {
             let pressure = 2.0 * 2e4 * (c.ln() + (1.0 - (c / 2.0).powi(3)) / 3.0);
             let u = 2e4 * (0.7 * c.powi(3) - 2.0 * 0.4 * (c.ln() + (1.0 - (c / 2.0).powi(3)) / 3.0)) / 1e7;
@@ -242,7 +243,8 @@ picture = false
 every_steps = 1
 "#;
 
-/// Each iteration doubles the digits once linear systems are solved to a tight tolerance: from 1e-3 two more reach 1e-11.
+/// Each iteration doubles the digits once linear systems are solved to a tight tolerance: from 1e-3 two
+/// more reach 1e-11.
 #[test]
 fn newton_converges_quadratically() {
     for law in [
