@@ -9,12 +9,20 @@
 //! |---|---|
 //! | `unknowns` | nodes, what holds them, ties, products |
 //! | `points` | stress and tangent of the particles |
+//! | `everywhere` | nodes of all ranks |
+//! | `lattice` | cells on the lattice of the finest nodes |
+//! | `bricks` | cells as elements |
+//! | `blocks` | sparse matrices of blocks, smoother, cycle |
 //! | `skyline` | factors of a symmetric matrix |
-//! | `coarse` | preconditioner: leaves as elements |
+//! | `multigrid` | preconditioner: its levels |
 //! | `newton` | the iteration |
 //! | `strength` | the search for a factor of safety |
 //! | this | a step |
-mod coarse;
+mod blocks;
+mod bricks;
+mod everywhere;
+mod lattice;
+mod multigrid;
 mod newton;
 mod points;
 mod skyline;

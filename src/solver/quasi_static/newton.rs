@@ -4,7 +4,7 @@
 //! and of stress. A correction solves the linearised balance, with the prescribed displacements as far as they
 //! are not reached, to a tolerance that falls with the residual (Eisenstat and Walker 1996); then it is
 //! halved until the residual, or its work on the correction, has fallen.
-use super::coarse::Coarse;
+use super::multigrid::Multigrid;
 use super::points::{Points, Sweep};
 use super::unknowns::{Held, Nodal, Unknowns};
 use crate::kernel::{Row, Scheme};
@@ -59,7 +59,8 @@ impl<const D: usize> Solver<D> {
         let mut points: Vec<Vec<Points>> = vec![Vec::new(); self.chunks.len()];
         let mut effort = Effort::default();
         let zero = vec![[0.0; D]; unknowns.nodes.len()];
-        let mut coarse = Coarse::new(&self.comm, &self.forest, &self.chunks, unknowns);
+        let (leaves, grid) = ((&self.forest, &self.chunks[..]), (&self.grid.plan, &self.physics.scheme()));
+        let mut multigrid = Multigrid::new(&self.comm, leaves, grid, unknowns);
         let Some(mut now) = self.iterate(unknowns, &mut points, outer, zero, dt) else { return Err(effort) };
         let mut forcing = FORCING[0];
         let is_moved = |held: &[Option<Held>; D]| held.iter().flatten().any(|held| held.way != 0.0);
@@ -77,10 +78,9 @@ impl<const D: usize> Solver<D> {
             effort.newton += 1;
             let enough = if now.norm > 0.0 { 0.3 * tolerance * now.greatest / now.norm } else { 0.0 };
             let target = forcing.max(enough.min(0.5));
-            let tree = (&self.forest, self.grid.plan.root_edge);
-            coarse.assemble(&self.comm, &self.chunks, &points, tree, &now.stiffness, unknowns);
+            multigrid.assemble(&self.comm, &points, &now.stiffness, unknowns);
             let correction =
-                self.correct(unknowns, &mut points, &coarse, &now, target, held_is_reached, &mut effort);
+                self.correct(unknowns, &mut points, &multigrid, &now, target, held_is_reached, &mut effort);
             let (slope, mut share): (f64, f64) =
                 (unknowns.products(&self.comm, [(&correction, &now.free)])[0], 1.0);
             let mut halvings = 0;
@@ -205,7 +205,7 @@ impl<const D: usize> Solver<D> {
         &mut self,
         unknowns: &Unknowns<D>,
         points: &mut [Vec<Points>],
-        coarse: &Coarse<D>,
+        multigrid: &Multigrid<D>,
         now: &Iterate<D>,
         target: f64,
         held_is_reached: bool,
@@ -229,7 +229,7 @@ impl<const D: usize> Solver<D> {
         if norm == 0.0 {
             return correction;
         }
-        let mut towards = coarse.towards(&self.comm, unknowns, &now.stiffness, &rest, norm);
+        let mut towards = multigrid.towards(&self.comm, unknowns, &rest, norm);
         let mut way = towards.way.clone();
         for _ in 0..LINEAR {
             let taken = self.resistance(unknowns, points, &way);
@@ -243,7 +243,7 @@ impl<const D: usize> Solver<D> {
             subtract(&mut correction, &way, -length);
             subtract(&mut rest, &taken, length);
             let scale = towards.square.sqrt();
-            let next = coarse.towards(&self.comm, unknowns, &now.stiffness, &rest, scale);
+            let next = multigrid.towards(&self.comm, unknowns, &rest, scale);
             let is_left = next.square.sqrt() > target * norm;
             if !is_left {
                 break;

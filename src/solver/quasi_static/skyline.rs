@@ -25,20 +25,10 @@ impl Skyline {
         Self { first, diagonal, values: vec![0.0; end] }
     }
 
-    /// Sets all entries to 0.
-    pub(super) fn clear(&mut self) {
-        self.values.fill(0.0);
-    }
-
     /// Adds to the entry of a row and a column, in either order.
     pub(super) fn add(&mut self, row: usize, column: usize, value: f64) {
         let (row, column) = (row.max(column), row.min(column));
         self.values[self.diagonal[row] - (row - column)] += value;
-    }
-
-    /// The diagonal entry of a row.
-    pub(super) fn diagonal(&mut self, row: usize) -> &mut f64 {
-        &mut self.values[self.diagonal[row]]
     }
 
     /// The row with its first column.
@@ -106,9 +96,9 @@ mod tests {
         let first = vec![0, 0, 1, 2, 4];
         let mut matrix = Skyline::new(first);
         for spring in 0..4 {
-            *matrix.diagonal(spring) += 2.0;
+            matrix.add(spring, spring, 2.0);
             if spring > 0 {
-                *matrix.diagonal(spring - 1) += 2.0;
+                matrix.add(spring - 1, spring - 1, 2.0);
                 matrix.add(spring - 1, spring, -2.0);
             }
         }

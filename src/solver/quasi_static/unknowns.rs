@@ -114,6 +114,11 @@ impl<const D: usize> Unknowns<D> {
         }));
     }
 
+    /// Tied nodes, by number, with the corners that they follow and the weights of these.
+    pub(super) fn ties(&self) -> &[(usize, Vec<(usize, f64)>)] {
+        &self.ties
+    }
+
     /// Shares a force on tied nodes out to their corners.
     pub(super) fn gather_ties(&self, forces: &mut [[f64; D]]) {
         for (node, corners) in &self.ties {
