@@ -6,9 +6,8 @@ use partition::comm::Comm;
 use partition::{Forest, MAX_LEVEL};
 use rayon::prelude::*;
 
-use super::everywhere::all_of;
+use super::everywhere::{all_of, whole_unit};
 use super::lattice::{Cell, overlaps, slope, weight};
-use super::multigrid::whole_unit;
 use super::points::{Matrix, Points};
 use crate::grid::plan::GridPlan;
 use crate::grid::plan::ghost_layer::Cover;

@@ -17,6 +17,12 @@ pub(super) fn all_of<T: bytemuck::Pod>(comm: &Comm, own: &[T]) -> Vec<T> {
     bytemuck::pod_collect_to_vec(&bytes)
 }
 
+/// Whole numbers per unit for sums of values up to `greatest`: a power of two.
+pub(super) fn whole_unit(greatest: f64) -> f64 {
+    let exponent = if greatest > 0.0 { libm::frexp(greatest).1 } else { 0 };
+    libm::ldexp(1.0, (45 - exponent).clamp(-1000, 1000))
+}
+
 /// Nodes of all ranks.
 pub(super) struct Everywhere<const D: usize> {
     /// What nodes follow that are tied: unknowns by place, with axes on which they do not follow.

@@ -16,7 +16,7 @@ use rustc_hash::FxHashMap;
 
 use super::blocks::{Blocks, Level, Weights, cycle, factors, without_held};
 use super::bricks::Bricks;
-use super::everywhere::{Everywhere, Share};
+use super::everywhere::{Everywhere, Share, whole_unit};
 use super::lattice::{Lattice, Mesh};
 use super::points::Points;
 use super::skyline::Skyline;
@@ -46,12 +46,6 @@ pub(super) struct Multigrid<const D: usize> {
     bottom: Skyline,
     /// Of each node of this rank, its number among the unknowns of all; none of tied ones.
     numbers: Vec<u32>,
-}
-
-/// Whole numbers per unit for sums of values up to `greatest`: a power of two.
-pub(super) fn whole_unit(greatest: f64) -> f64 {
-    let exponent = if greatest > 0.0 { libm::frexp(greatest).1 } else { 0 };
-    libm::ldexp(1.0, (45 - exponent).clamp(-1000, 1000))
 }
 
 impl<const D: usize> Multigrid<D> {
