@@ -17,6 +17,11 @@ const ITERATIONS: u32 = 25;
 const LINEAR: u32 = 1000;
 /// Halvings of a correction.
 const HALVINGS: u32 = 6;
+/// Corrections of a step that are made in full though no share of them lets the residual fall: where the law has
+/// an edge, a state on it may have no direction that does, and the next correction knows the other side.
+const FORCED: u32 = 3;
+/// Residual up to which they are, over the forces: farther off, a shorter step is safer.
+const NEARLY_BALANCED: f64 = 1e-3;
 /// Tolerance of the first linear system, and the greatest of all.
 const FORCING: [f64; 2] = [1e-2, 0.1];
 /// Greatest displacement of a node in a step, in cells.
@@ -63,6 +68,8 @@ impl<const D: usize> Solver<D> {
         let mut multigrid = Multigrid::new(&self.comm, leaves, grid, unknowns);
         let Some(mut now) = self.iterate(unknowns, &mut points, outer, zero, dt) else { return Err(effort) };
         let mut forcing = FORCING[0];
+        // A search for a factor of safety looks for steps that fail.
+        let mut forced = if self.physics.reduction.is_some() { FORCED } else { 0 };
         let is_moved = |held: &[Option<Held>; D]| held.iter().flatten().any(|held| held.way != 0.0);
         let mut held_is_reached = !self.comm.any(unknowns.held.iter().any(is_moved));
         loop {
@@ -83,7 +90,7 @@ impl<const D: usize> Solver<D> {
                 self.correct(unknowns, &mut points, &multigrid, &now, target, held_is_reached, &mut effort);
             let (slope, mut share): (f64, f64) =
                 (unknowns.products(&self.comm, [(&correction, &now.free)])[0], 1.0);
-            let mut halvings = 0;
+            let (mut halvings, mut is_forced) = (0, false);
             let next = loop {
                 let way: Nodal<D> = now
                     .way
@@ -97,7 +104,8 @@ impl<const D: usize> Solver<D> {
                     let is_less = next.norm < (1.0 - 1e-4 * share) * now.norm;
                     let work = unknowns.products(&self.comm, [(&correction, &next.free)])[0];
                     let is_first = !held_is_reached && share == 1.0;
-                    if is_first
+                    if is_forced
+                        || is_first
                         || is_less
                         || work.abs() <= 0.5 * slope.abs()
                         || next.norm <= tolerance * next.greatest
@@ -108,7 +116,10 @@ impl<const D: usize> Solver<D> {
                 halvings += 1;
                 share *= 0.5;
                 if halvings > HALVINGS {
-                    break None;
+                    if is_forced || forced == FORCED || effort.residual > NEARLY_BALANCED {
+                        break None;
+                    }
+                    (forced, is_forced, share) = (forced + 1, true, 1.0);
                 }
             };
             let Some(next) = next else {
