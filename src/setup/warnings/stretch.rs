@@ -12,7 +12,7 @@ use crate::setup::seed::raster;
 use crate::text::{excerpt, number, quantity};
 
 /// Greatest traction over Young's modulus: beyond, the outermost particles may come off; measured.
-const TRACTION: f64 = 0.4;
+const TRACTION: f64 = 0.45;
 /// Stretch up to which elastic bodies hold together whose particles are halved; measured, see
 /// `docs/known-limits.md`.
 const HELD: f64 = 3.2;
