@@ -59,13 +59,15 @@ impl<const D: usize> Finder<D> {
         around + size_of_val(&self.around[..]) + size_of_val(&self.sums[..])
     }
 
-    /// Finds the ties of a velocity field, with those of the step before; see [`super::Ties::tie`].
+    /// Finds the ties of a velocity field, with those of the step before; see [`super::Ties::tie`]. Nodes between
+    /// cells on both sides have ties if `spans_gaps`.
     pub(super) fn find(
         &mut self,
         plan: &GridPlan<D>,
         fields: &NodeFields<D>,
         filled: &[u64],
         memory: &mut Memory,
+        spans_gaps: bool,
         held: impl Fn(usize, u64) -> u64 + Sync,
     ) {
         self.look_around(plan, fields);
@@ -92,7 +94,9 @@ impl<const D: usize> Finder<D> {
             .collect();
         let blocks = memory.blocks.par_iter_mut().enumerate().with_min_len(64);
         let changed = blocks.map(|(block, known)| match (known, self.around[block].as_deref()) {
-            (Some(known), Some(around)) if known.loose != 0 => self.tie(block, around, &free, known),
+            (Some(known), Some(around)) if known.loose != 0 => {
+                self.tie(block, around, &free, spans_gaps, known)
+            }
             _ => false,
         });
         let is_changed = changed.reduce(|| false, |a, b| a | b);
@@ -151,7 +155,14 @@ impl<const D: usize> Finder<D> {
 
     /// Finds the ties of a block, given the free nodes of all blocks near it. Returns whether they may differ
     /// from those that were known.
-    fn tie(&self, block: usize, around: &Neighbourhood, free: &[u64], known: &mut Known) -> bool {
+    fn tie(
+        &self,
+        block: usize,
+        around: &Neighbourhood,
+        free: &[u64],
+        spans_gaps: bool,
+        known: &mut Known,
+    ) -> bool {
         let free = around.of_blocks(free);
         if known.free == Some(free) {
             return false;
@@ -173,7 +184,9 @@ impl<const D: usize> Finder<D> {
                 let cells: Vec<[i32; D]> = ring.iter().filter(is_good).copied().collect();
                 (!cells.is_empty()).then_some(cells)
             });
-            let Some(cells) = nearest else { continue };
+            let Some(cells) = nearest.filter(|cells| spans_gaps || !are_on_both_sides(cells)) else {
+                continue;
+            };
             let plane = Plane::of(&cells);
             let corners = plane.nodes().filter_map(|(offset, weight)| {
                 around.node(beside(offset)).map(|node| Corner::new(row(node), weight))
@@ -182,6 +195,11 @@ impl<const D: usize> Finder<D> {
         }
         true
     }
+}
+
+/// Whether some of these cells, relative to a node, lie beyond it from others along an axis.
+fn are_on_both_sides<const D: usize>(cells: &[[i32; D]]) -> bool {
+    (0..D).any(|a| cells.iter().any(|cell| cell[a] < -1) && cells.iter().any(|cell| cell[a] > 0))
 }
 
 /// Least mass of a node that is tied, kg: the inverse of less may not be finite.

@@ -97,7 +97,7 @@ impl<const D: usize> Ties<D> {
 
     /// Not collective. Ties the nodes of the velocity field of this number, whose rows hold velocities and
     /// masses. `held` returns those of some nodes of a block that are fixed by other conditions; these are not
-    /// tied, nor is anything tied to them.
+    /// tied, nor is anything tied to them. Nodes between two bodies belong to neither.
     pub fn tie(
         &mut self,
         plan: &GridPlan<D>,
@@ -110,13 +110,15 @@ impl<const D: usize> Ties<D> {
         }
         let memory = &mut self.memories[field];
         let known = |block: usize| self.on_faces[block] | self.near_still[block].unwrap_or(0);
-        self.finder
-            .find(plan, fields, &self.filled, memory, |block, nodes| known(block) | held(block, nodes));
+        self.finder.find(plan, fields, &self.filled, memory, false, |block, nodes| {
+            known(block) | held(block, nodes)
+        });
         memory.tied.pull(fields);
     }
 
     /// Not collective. The ties of a velocity field, whose rows hold masses; `held` as in [`Ties::tie`], where
-    /// nodes on faces of the domain are not fixed for that alone.
+    /// nodes on faces of the domain are not fixed for that alone. Nodes between two bodies have ties as well: free,
+    /// they would have next to no stiffness.
     pub fn search(
         &mut self,
         plan: &GridPlan<D>,
@@ -124,7 +126,7 @@ impl<const D: usize> Ties<D> {
         held: impl Fn(usize, u64) -> u64 + Sync,
     ) -> Tied {
         let mut memory = Memory::default();
-        self.finder.find(plan, fields, &self.filled, &mut memory, held);
+        self.finder.find(plan, fields, &self.filled, &mut memory, true, held);
         memory.tied
     }
 }
