@@ -285,7 +285,7 @@ fn templates_run_as_they_are() {
             !text.contains(&format!("jobs/{name}.toml")) && !text.contains(&format!("out/{name}/")),
             "{name}"
         );
-        let end = format!("{:e}", 3.5 * time_step(&printed(&agimp(here, &["check", &file]))));
+        let end = format!("{:e}", few_steps(&printed(&agimp(here, &["check", &file]))));
         let run = ["run", &file, "--end", &end, "--quiet", "--set", "output.picture=false"];
         let output = agimp(here, &run);
         assert_eq!(output.status.code(), Some(0), "{name}: {}", String::from_utf8_lossy(&output.stderr));
@@ -295,9 +295,10 @@ fn templates_run_as_they_are() {
     assert_eq!(schema.trim_end(), printed(&agimp(here, &["schema"])).trim_end());
 }
 
-/// The time step that `agimp check` prints, s.
-fn time_step(check: &str) -> f64 {
-    let line = check.lines().find_map(|line| line.strip_prefix("time step")).expect("a time step");
+/// Time of three steps and a half, by the time step or load step that `agimp check` prints, s.
+fn few_steps(check: &str) -> f64 {
+    let line_of = |name: &str| check.lines().find_map(|line| line.strip_prefix(name));
+    let line = line_of("time step").or(line_of("load step")).expect("a step");
     let mut words = line.split_whitespace().skip_while(|word| word.parse::<f64>().is_err());
     let number: f64 = words.next().and_then(|word| word.parse().ok()).expect("a number");
     let scale = match words.next().expect("a unit").trim_end_matches([',', ';']) {
@@ -307,7 +308,7 @@ fn time_step(check: &str) -> f64 {
         "ns" => 1e-9,
         other => panic!("{other}"),
     };
-    number * scale
+    3.5 * number * scale
 }
 
 /// As in `agimp schema | head -1`.
