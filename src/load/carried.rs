@@ -124,22 +124,16 @@ impl<const D: usize> Carried<D> {
         std::array::from_fn(|a| main * normal[a] * half[a])
     }
 
-    /// First moment (N m) of this force (N) on a particle that carries these numbers: component i by the place along
-    /// k. The parts of the area across each axis act at the face of its box there, with the half widths `half`, m; a
-    /// pressure along that axis alone. The moment is about its centre of mass, which lies `ahead` of the
-    /// middle of the box along the first axis, m. `None` for forces on points.
-    pub fn moment(
-        &self,
-        numbers: &[f64],
-        force: &[f64; D],
-        half: &[f64; D],
-        ahead: f64,
-    ) -> Option<[[f64; D]; D]> {
-        let first = self.area_vector()?;
-        let area: [f64; D] = std::array::from_fn(|a| numbers[first + a]);
+    /// First moment (N m) of this force (N) on a particle that carries these numbers: component i by the place
+    /// along k. The parts of the area across each axis act at the face of its box there, with the half widths
+    /// `half`, m; a pressure along that axis alone. The moment is about its centre of mass, which lies `ahead`
+    /// of the middle of the box along the first axis, m. 0 for forces on points.
+    pub fn moment(&self, numbers: &[f64], force: &[f64; D], half: &[f64; D], ahead: f64) -> [[f64; D]; D] {
+        let area: [f64; D] =
+            self.area_vector().map_or([0.0; D], |first| std::array::from_fn(|a| numbers[first + a]));
         let total: f64 = area.iter().map(|a| a.abs()).sum();
         if total == 0.0 {
-            return None;
+            return [[0.0; D]; D];
         }
         let is_pressure = matches!(self.force, CarriedForce::Pressure { .. });
         let share = |i: usize, k: usize| match is_pressure {
@@ -147,7 +141,7 @@ impl<const D: usize> Carried<D> {
             false => area[k].abs() / total,
         };
         let way = |k: usize| area[k].signum() * half[k] - if k == 0 { ahead } else { 0.0 };
-        Some(std::array::from_fn(|i| std::array::from_fn(|k| force[i] * share(i, k) * way(k))))
+        std::array::from_fn(|i| std::array::from_fn(|k| force[i] * share(i, k) * way(k)))
     }
 
     /// The size of the area that a particle with these numbers stands for, m².

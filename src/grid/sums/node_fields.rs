@@ -50,6 +50,12 @@ struct Slot<'a> {
 }
 
 impl<const D: usize> NodeFields<D> {
+    /// Those of some nodes of a block, a bit each, that have more than this mass, kg.
+    pub fn with_mass(&self, block: usize, nodes: u64, least: f64) -> u64 {
+        let rows = &self.rows[block * block_nodes(D)..][..block_nodes(D)];
+        bits(nodes).filter(|&bit| rows[bit as usize].0[3] > least).fold(0, |nodes, bit| nodes | 1 << bit)
+    }
+
     /// Fields for the blocks of a plan.
     pub fn new(plan: &GridPlan<D>) -> Self {
         let nodes = block_nodes(D);

@@ -86,7 +86,7 @@ impl<const D: usize> Finder<D> {
             .with_min_len(64)
             .map(|block| match near[block] && fields.active[block] {
                 true => {
-                    let moving = with_mass(fields, block, plan.blocks[block].real_nodes());
+                    let moving = fields.with_mass(block, plan.blocks[block].real_nodes(), LEAST_MASS);
                     moving & !held(block, moving)
                 }
                 false => 0,
@@ -149,7 +149,7 @@ impl<const D: usize> Finder<D> {
             *known = Some(Box::new(new));
         }
         let Some(known) = known else { return false };
-        known.loose = with_mass(fields, block, known.untouched);
+        known.loose = fields.with_mass(block, known.untouched, LEAST_MASS);
         known.loose != 0
     }
 
@@ -204,9 +204,3 @@ fn are_on_both_sides<const D: usize>(cells: &[[i32; D]]) -> bool {
 
 /// Least mass of a node that is tied, kg: the inverse of less may not be finite.
 const LEAST_MASS: f64 = 1e-150;
-
-/// Nodes among those given of a block that have mass.
-fn with_mass<const D: usize>(fields: &NodeFields<D>, block: usize, nodes: u64) -> u64 {
-    let rows = &fields.rows[block * block_nodes(D)..][..block_nodes(D)];
-    bits(nodes).filter(|&bit| rows[bit as usize].0[3] > LEAST_MASS).fold(0, |nodes, bit| nodes | 1 << bit)
-}

@@ -220,8 +220,7 @@ impl<const D: usize> Solver<D> {
             colliders.filter(|(_, ((collider, _), _))| collider.acts_on_nodes()).collect();
         let active = plan.blocks.iter().enumerate().filter(|(index, _)| grid.fields.active[*index]);
         for (index, block) in active {
-            let with_mass = |bit: &u32| rows[index * nodes + *bit as usize].0[3] > 0.0;
-            let filled = bits(block.real_nodes()).filter(with_mass).fold(0, |all, bit| all | 1 << bit);
+            let filled = grid.fields.with_mass(index, block.real_nodes(), 0.0);
             let inside: Vec<u64> = colliders
                 .iter()
                 .map(|(_, ((collider, state), _))| {

@@ -6,10 +6,11 @@
 //! particle has the velocity `v + Δt f / m`, and its own again afterwards: the force passes through parts of
 //! boxes and constrained nodes like momentum, and no kernel handles loads.
 //!
-//! A force on a surface acts at the surface, with the moment `M = f ⊗ d` by its way d from the centre of the particle: to first
-//! order nodes get `Δt (w f + M ∇w)`, so that uniform stress balances a uniform load to round-off where boxes tile cells. At the
-//! centres it would leave half of the load in the outermost row. The second term is that of a stress `−M / V₀`, which the particle has for
-//! P2G, of M the symmetric part. The work is `f · Δx + Δt M : ∇v` with the displacement Δx of the particle.
+//! A force on a surface acts at the surface, with the moment `M = f ⊗ d` by its way d from the centre of the
+//! particle: to first order nodes get `Δt (w f + M ∇w)`, so that uniform stress balances a uniform load to
+//! round-off where boxes tile cells. At the centres it would leave half of the load in the outermost row. The
+//! second term is that of a stress `−M / V₀`, which the particle has for P2G: of M the symmetric part, and all
+//! of it in load steps. The work is `f · Δx + Δt M : ∇v` with the displacement Δx of the particle.
 use rayon::prelude::*;
 
 use crate::exact_sum::ExactSum;
@@ -31,8 +32,15 @@ use crate::solver::state::phases::Phase;
 pub(in crate::solver) struct Unpushed<const D: usize> {
     particle: u32,
     velocity: [f64; D],
-    /// First of some columns, and their values, where a force acts at a surface.
-    stress: Option<(usize, Vec<f64>)>,
+    /// Where a force acts at a surface.
+    stress: Option<Stress>,
+}
+
+/// Stress that a particle has for P2G: its first column, the number of columns, and their values, Pa.
+struct Stress {
+    first: usize,
+    count: usize,
+    values: [f64; 9],
 }
 
 /// Greatest number of columns that a particle carries for a load.
@@ -59,13 +67,14 @@ fn surface_at<const D: usize>(
     std::array::from_fn(|a| x[a] + way[a])
 }
 
-/// Adds `−M / V₀` with the moments M of some forces to the stress that a particle has for P2G. Returns what it was.
+/// Adds `−M / V₀` with the moments M of some forces to the stress that a particle has for P2G. Returns what it
+/// was.
 fn push_stress<const D: usize>(
     chunk: &mut Chunk<D>,
     p: usize,
     pushes: &[ParticlePush<D>],
     is_in_steps: bool,
-) -> (usize, Vec<f64>) {
+) -> Stress {
     let [half] = chunk.read(Layout::<D>::HALF, p);
     let volume = box_volume::<D>(half);
     let moment = |i: usize, k: usize| pushes.iter().map(|push| push.moment[i][k]).sum::<f64>() / volume;
@@ -73,9 +82,9 @@ fn push_stress<const D: usize>(
         true => (Layout::<D>::AFFINE, D * D),
         false => (Layout::<D>::STRESS, 6),
     };
-    let column = |c: usize| chunk.column(first + c)[p];
-    let before: Vec<f64> = (0..count).map(column).collect();
-    let mut after = before.clone();
+    let column = |c: usize| if c < count { chunk.column(first + c)[p] } else { 0.0 };
+    let before = Stress { first, count, values: std::array::from_fn(column) };
+    let mut after = before.values;
     for (i, k) in (0..D).flat_map(|i| (0..D).map(move |k| (i, k))) {
         match is_in_steps {
             true => after[D * i + k] -= moment(i, k),
@@ -83,8 +92,8 @@ fn push_stress<const D: usize>(
             false => after[i + k + 2] -= 0.5 * moment(i, k),
         }
     }
-    chunk.write(first, p, &after);
-    (first, before)
+    chunk.write(first, p, &after[..count]);
+    before
 }
 
 /// Half widths of the box of a particle in a leaf with cells of this edge, m.
@@ -189,7 +198,7 @@ impl<const D: usize> Pushing<'_, D> {
                 let x = surface_at(chunk, carried, &numbers, p, &half);
                 let force = load.force(carried, &numbers, &place(&x), self.middle - load.start);
                 let ahead = self.coordinates.to_mass_centre(half[0], chunk.position(p)[0]);
-                Some((force, carried.moment(&numbers, &force, &half, ahead).unwrap_or([[0.0; D]; D])))
+                Some((force, carried.moment(&numbers, &force, &half, ahead)))
             }
             Kind::Water(water) => {
                 let at = place(&chunk.position(p)).now;
@@ -284,8 +293,8 @@ impl<const D: usize> Solver<D> {
         for (chunk, before) in self.chunks.iter_mut().zip(before) {
             for Unpushed { particle, velocity, stress } in before {
                 chunk.write(Layout::<D>::VELOCITY, *particle as usize, velocity);
-                if let Some((first, values)) = stress {
-                    chunk.write(*first, *particle as usize, values);
+                if let Some(Stress { first, count, values }) = stress {
+                    chunk.write(*first, *particle as usize, &values[..*count]);
                 }
             }
         }

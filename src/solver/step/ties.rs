@@ -3,11 +3,11 @@
 use rayon::prelude::*;
 
 use crate::boundary::{Collider, ColliderState};
+use crate::grid::GridPlan;
 use crate::grid::leaf_geometry::{LeafCells, leaf_box};
-use crate::grid::mask::{bits, block_nodes};
+use crate::grid::mask::bits;
 use crate::grid::plan::Block;
 use crate::grid::ties::Ties;
-use crate::grid::{GridPlan, NodeFields};
 use crate::kernel::BLOCK;
 use crate::load::{Kind, Load};
 use crate::particle::Chunk;
@@ -75,27 +75,21 @@ fn near_colliders<const D: usize>(
     near
 }
 
-/// Real nodes with mass, a word for each block.
-fn with_mass<const D: usize>(plan: &GridPlan<D>, fields: &NodeFields<D>) -> Vec<u64> {
-    let nodes = block_nodes(D);
-    let all = plan.blocks.par_iter().zip(&fields.active).enumerate().with_min_len(64);
-    let words = all.map(|(index, (block, active))| match active {
-        true => {
-            let has_mass = |bit: &u32| fields.rows[index * nodes + *bit as usize].0[3] > 0.0;
-            bits(block.real_nodes()).filter(has_mass).fold(0, |all, bit| all | 1 << bit)
-        }
-        false => 0,
-    });
-    words.collect()
-}
-
 impl<const D: usize> Solver<D> {
-    /// Nodes with mass of each velocity field, a word for each block, where fields with ties meet others. To be
-    /// called before velocities of nodes change.
+    /// Nodes with mass of each velocity field, a word for each block, where fields with ties meet others. To
+    /// be called before velocities of nodes change.
     pub(super) fn occupied(&mut self) -> Vec<Vec<u64>> {
         let mut occupied = Vec::new();
         if self.grid.ties.is_some() && self.physics.body_contacts.fields() > 1 {
-            self.for_each_field(|solver, _| occupied.push(with_mass(&solver.grid.plan, &solver.grid.fields)));
+            self.for_each_field(|solver, _| {
+                let Grid { fields, plan, .. } = &solver.grid;
+                let blocks = plan.blocks.par_iter().zip(&fields.active).enumerate().with_min_len(64);
+                let words = blocks.map(|(index, (block, active))| match active {
+                    true => fields.with_mass(index, block.real_nodes(), 0.0),
+                    false => 0,
+                });
+                occupied.push(words.collect());
+            });
         }
         occupied
     }
