@@ -40,11 +40,7 @@ pub(crate) fn job(size: [f64; 2], rest: &str) -> String {
 }
 
 pub(crate) fn history(name: &str, text: &str) -> History {
-    let directory = tempfile::tempdir().expect("temporary directory");
-    let path = directory.path().join(format!("{name}.toml"));
-    std::fs::write(&path, text).expect("job");
-    succeed(&mut run(directory.path(), 1, 1, &path, &["--quiet"]));
-    History::read(directory.path(), name)
+    History::of_job(name, text, &[])
 }
 
 pub(crate) fn solver(comm: &Comm, text: &str) -> Solver<2> {

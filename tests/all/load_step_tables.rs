@@ -2,16 +2,6 @@
 //! weight, a notched bar, a sphere under inner pressure.
 
 use crate::common::history::History;
-use crate::common::launch::{run, succeed};
-
-/// Runs a job and reads its history.
-fn history(job: &str, name: &str) -> History {
-    let directory = tempfile::tempdir().expect("temporary directory");
-    let path = directory.path().join(format!("{name}.toml"));
-    std::fs::write(&path, job).expect("job");
-    succeed(&mut run(directory.path(), 1, 1, &path, &["--quiet"]));
-    History::read(directory.path(), name)
-}
 
 /// A block of 1 m, fixed below, half of it; probes measure the mean of four particles round a point.
 const BLOCK: &str = r#"
@@ -59,7 +49,7 @@ every_steps = 1
 /// Finite elements with 9 nodes, in ρ g H² / E. The difference is that to the greatest displacement, 0.447.
 #[test]
 fn a_block_under_its_weight_is_that_of_finite_elements() {
-    let found = history(BLOCK, "block");
+    let found = History::of_job("block", BLOCK, &[]);
     let moved = |column: &str| {
         let values = found.column(column);
         (values[values.len() - 1] - values[0]) / 0.002
@@ -123,7 +113,7 @@ every_steps = 1
 fn a_notched_bar_bears_what_finite_elements_say() {
     let revolution = BAR.replace("dimension = 2", "dimension = 2\ngeometry = \"axisymmetric\"");
     for (job, last) in [(BAR.to_owned(), 1600.1), (revolution, 2168.6)] {
-        let found = history(&job, "bar");
+        let found = History::of_job("bar", &job, &[]);
         let force = found.column("load_pull_y").last().expect("rows");
         println!("{force} of {last}: {:+.2} %", 100.0 * (force / last - 1.0));
         assert!((force / last - 1.0).abs() < 0.02, "{force} of {last}");
@@ -175,7 +165,7 @@ every_steps = 1
 /// Hill (1950). The displacement of the inner wall is from the work of the pressure over half of the sphere.
 #[test]
 fn a_sphere_under_inner_pressure_yields_as_the_closed_form_says() {
-    let found = history(SPHERE, "sphere");
+    let found = History::of_job("sphere", SPHERE, &[]);
     let (times, works) = (found.column("time"), found.column("work_inside"));
     let (mut way, mut before) = (0.0, 0.0);
     for (time, work) in times.iter().zip(works).skip(1) {
@@ -257,7 +247,7 @@ fn newton_converges_quadratically() {
             .iter()
             .map(|tolerance| {
                 let job = PRESSED.replace("LAW", law).replace("TOLERANCE", tolerance);
-                let found = history(&job, "pressed");
+                let found = History::of_job("pressed", &job, &[]);
                 ["newton_iterations", "unbalanced_force"]
                     .map(|name| *found.column(name).last().expect("rows"))
             })

@@ -2,23 +2,7 @@
 //! level and of several, with the same bits on any ranks and across restarts.
 
 use crate::common::history::History;
-use crate::common::launch::{run, succeed};
 use crate::common::restart;
-
-/// Runs a job and reads its history.
-fn history(job: &str, name: &str, set: &[&str]) -> History {
-    let directory = tempfile::tempdir().expect("temporary directory");
-    let path = directory.path().join(format!("{name}.toml"));
-    std::fs::write(&path, job).expect("job");
-    let mut arguments = vec!["--quiet"];
-    set.iter().for_each(|set| arguments.extend(["--set", set]));
-    succeed(&mut run(directory.path(), 1, 1, &path, &arguments));
-    History::read(directory.path(), name)
-}
-
-fn last(history: &History, column: &str) -> f64 {
-    *history.column(column).last().expect("rows")
-}
 
 /// A soft column under its weight, 50 m high (Charlton, Coombs and Augarde 2017).
 const COLUMN: &str = r#"
@@ -68,9 +52,9 @@ fn a_column_under_its_weight_is_as_high_as_theory_says() {
     let (parts, top) = (1000, 49.75);
     let part = top / f64::from(parts);
     let height: f64 = (0..parts).map(|i| part * stretch(50.0 - part * (f64::from(i) + 0.5))).sum();
-    let found = history(COLUMN, "column", &[]);
-    let error = last(&found, "centre_top_y") / height - 1.0;
-    let force = last(&found, "force_y_min_y");
+    let found = History::of_job("column", COLUMN, &[]);
+    let error = found.last("centre_top_y") / height - 1.0;
+    let force = found.last("force_y_min_y");
     println!("height {error:+.1e}, force {force:.1} N");
     assert!(error.abs() < 2e-4, "{error}");
     assert!((force / -160e3 - 1.0).abs() < 1e-4, "{force}");
@@ -120,8 +104,9 @@ const FINE: &str = "tree.regions=[{ level = 4, shape = { kind = 'box', min = [0.
 
 /// Linear iterations of the one step, over all its linear systems.
 fn iterations(set: &[&str]) -> f64 {
-    let found = history(SLOPE, "slope", set);
-    let [newton, linear] = ["newton_iterations", "linear_iterations"].map(|name| last(&found, name));
+    let arguments: Vec<&str> = set.iter().flat_map(|set| ["--set", set]).collect();
+    let found = History::of_job("slope", SLOPE, &arguments);
+    let [newton, linear] = ["newton_iterations", "linear_iterations"].map(|name| found.last(name));
     assert!(newton <= 3.0, "{set:?}: {newton}");
     linear
 }
@@ -180,8 +165,8 @@ every_steps = 1
 
 #[test]
 fn a_block_beyond_yield_bears_what_plane_strain_says() {
-    let found = history(BLOCK, "block", &[]);
-    let force = last(&found, "load_plate_y");
+    let found = History::of_job("block", BLOCK, &[]);
+    let force = found.last("load_plate_y");
     // Of its volume the block loses next to nothing.
     let width = 2.0 / (1.0 - 0.04 / 2.0);
     let exact = -2.0 / 3.0_f64.sqrt() * 1e6 * width;

@@ -3,7 +3,7 @@
 //! cantilever; same bits on any ranks.
 
 use crate::common::history::History;
-use crate::common::launch::{agimp, run, succeed};
+use crate::common::launch::agimp;
 use crate::common::relaunch::{ran_if_launched, relaunch};
 use crate::common::restart;
 use agimp::exact_sum::ExactSum;
@@ -47,11 +47,7 @@ fn with_speed(text: &str) -> String {
 }
 
 fn history(text: &str, name: &str) -> History {
-    let directory = tempfile::tempdir().expect("temporary directory");
-    let path = directory.path().join(format!("{name}.toml"));
-    std::fs::write(&path, text).expect("job");
-    succeed(&mut run(directory.path(), 1, 1, &path, &["--quiet"]));
-    History::read(directory.path(), name)
+    History::of_job(name, text, &[])
 }
 
 /// The impulse of dead loads is force times time, all momentum comes from loads, and the energy that they

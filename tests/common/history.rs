@@ -2,14 +2,15 @@
 use std::collections::HashMap;
 use std::path::Path;
 
+use super::launch::{file, run, succeed};
+
 /// Columns of a history by name, without units.
 pub(crate) struct History(HashMap<String, Vec<f64>>);
 
 impl History {
     /// Of the run of this name in a directory.
     pub(crate) fn read(directory: &Path, name: &str) -> Self {
-        let text =
-            std::fs::read_to_string(super::launch::file(directory, name, ".history.csv")).expect("history");
+        let text = std::fs::read_to_string(file(directory, name, ".history.csv")).expect("history");
         let mut lines = text.lines();
         let names = lines.next().expect("header").split(',');
         let rows: Vec<Vec<f64>> =
@@ -17,6 +18,16 @@ impl History {
         let column = |i: usize| rows.iter().map(|row| row[i]).collect();
         let name = |cell: &str| cell.split(' ').next().unwrap_or_default().to_owned();
         Self(names.enumerate().map(|(i, cell)| (name(cell), column(i))).collect())
+    }
+
+    /// Of a job of this name and text, run on one rank and thread with these arguments.
+    pub(crate) fn of_job(name: &str, text: &str, arguments: &[&str]) -> Self {
+        let directory = tempfile::tempdir().expect("temporary directory");
+        let path = directory.path().join(format!("{name}.toml"));
+        std::fs::write(&path, text).expect("job");
+        let arguments: Vec<&str> = std::iter::once("--quiet").chain(arguments.iter().copied()).collect();
+        succeed(&mut run(directory.path(), 1, 1, &path, &arguments));
+        Self::read(directory.path(), name)
     }
 
     /// Values of a column, row by row.
