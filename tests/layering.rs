@@ -131,7 +131,7 @@ fn imports(file: &str, text: &str) -> Vec<Vec<String>> {
     found.iter().filter_map(|path| absolute(path, &own, &children)).collect()
 }
 
-/// What a `mod.rs` imports: others may take it from there, its children even without `pub`.
+/// Imports of a `mod.rs`: others may take it from there, its children even without `pub`.
 fn handed_on(text: &str) -> Vec<Vec<String>> {
     let text = code(text);
     let mut handed = Vec::new();

@@ -43,7 +43,7 @@ impl Default for Contact {
 }
 
 impl Contact {
-    /// What a surface under this law asks of material for which the gap asks this: surfaces that separate
+    /// Demand of a surface under this law on material for which the gap asks this: surfaces that separate
     /// hold nothing.
     pub fn bounds(self, of_gap: Bounds) -> Bounds {
         match self {

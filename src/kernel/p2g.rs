@@ -14,8 +14,8 @@
 //! X_a = wx_a q + wx_a dx_a C_x + wx'_a T_x,  Y_b = wy_b dy_b C_y + wy'_b T_y,  Z_c alike
 //! row = (wy_b wz_c) X_a + wx_a (wz_c Y_b + wy_b Z_c)
 //! ```
-//! With [`Scheme::forces`] the particles' affine columns hold a stress that need not be symmetric, in place of
-//! τ, and there is no affine momentum.
+//! With [`Scheme::forces`] the particles' affine columns hold a stress that need not be symmetric, in place
+//! of τ, and there is no affine momentum.
 //!
 //! In axisymmetry the hoop stress adds `-Δt V₀ τ_θθ T` to the momentum along the radius, with T the plain mean
 //! of the hat over the box, over the radius; it has a pass of its own.

@@ -124,10 +124,10 @@ impl<const D: usize> Carried<D> {
         std::array::from_fn(|a| main * normal[a] * half[a])
     }
 
-    /// First moment (N m) of this force (N) on a particle that carries these numbers: component i by the place
-    /// along k. The parts of the area across each axis act at the face of its box there, with the half widths
-    /// `half`, m; a pressure along that axis alone. The moment is about its centre of mass, which lies `ahead`
-    /// of the middle of the box along the first axis, m. 0 for forces on points.
+    /// First moment (N m) of this force (N) on a particle that carries these numbers: component i by the
+    /// place along k. The parts of the area across each axis act at the face of its box there, with the half
+    /// widths `half`, m; a pressure along that axis alone. The moment is about its centre of mass, which lies
+    /// `ahead` of the middle of the box along the first axis, m. 0 for forces on points.
     pub fn moment(&self, numbers: &[f64], force: &[f64; D], half: &[f64; D], ahead: f64) -> [[f64; D]; D] {
         let area: [f64; D] =
             self.area_vector().map_or([0.0; D], |first| std::array::from_fn(|a| numbers[first + a]));

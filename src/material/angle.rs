@@ -9,8 +9,8 @@ pub(super) fn weakened(degrees: f64, factor: f64) -> f64 {
     libm::atan(libm::tan(degrees.to_radians()) / factor).to_degrees()
 }
 
-/// Share of cohesion and `tan φ` that material with associated flow needs to be as strong as one with friction
-/// angle φ and dilation angle ψ, in degrees: `cos ψ cos φ / (1 - sin ψ sin φ)` (Davis 1968).
+/// Share of cohesion and `tan φ` that material with associated flow needs to be as strong as one with
+/// friction angle φ and dilation angle ψ, in degrees: `cos ψ cos φ / (1 - sin ψ sin φ)` (Davis 1968).
 pub(super) fn davis(friction: f64, dilation: f64) -> f64 {
     if friction == dilation {
         return 1.0;

@@ -74,8 +74,8 @@ pub trait Law: std::fmt::Debug + Send + Sync {
         None
     }
 
-    /// See [`super::Material::strain_under`]. By default that of [`Law::solid`]; without either, no body of this law
-    /// can start under stress.
+    /// See [`super::Material::strain_under`]. By default that of [`Law::solid`]; without either, no body of
+    /// this law can start under stress.
     fn strain_under(
         &self,
         stress: [f64; 3],

@@ -46,9 +46,10 @@ const COLUMNS: [Column<'static>; 20] = [
 
 /// Names and units of the columns after the step. Parts of a job add their own in this order: splits and
 /// merges of dynamic refinement; the work of the shift of fluids; work and heat of artificial viscosity; the
-/// progress towards equilibrium; effort of load steps, and the factor over which the strength is; the number of the stage, from 1; sources; failed particles; water in the
-/// pores; loads; contacts between bodies; probes; tracks; fluxes; faces of the domain, and the thrust of the
-/// water on them; colliders, each with that on it.
+/// progress towards equilibrium; effort of load steps, and the factor over which the strength is; the number
+/// of the stage, from 1; sources; failed particles; water in the pores; loads; contacts between bodies;
+/// probes; tracks; fluxes; faces of the domain, and the thrust of the water on them; colliders, each with
+/// that on it.
 pub fn columns<const D: usize>(problem: &Problem<D>) -> Vec<(String, &'static str)> {
     let mut columns: Vec<(String, &'static str)> =
         COLUMNS.iter().map(|column| (column.name.to_owned(), column.unit)).collect();

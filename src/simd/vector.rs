@@ -1,4 +1,4 @@
-//! What a vector of particles can do.
+//! Operations of a vector of particles.
 use std::ops::{Add, AddAssign, BitAnd, BitOr, Div, Mul, Neg, Not, Sub};
 
 use super::F64x4;
@@ -20,8 +20,9 @@ pub trait Vector:
     /// One truth value for each particle.
     type Mask: VectorMask<Self>;
 
-    /// Whether numbers carry derivatives by the principal values of a tensor ([`super::Dual`]). Then tensors are
-    /// diagonal: what finds principal axes step by step, or leaves the type, takes those of the coordinates.
+    /// Whether numbers carry derivatives by the principal values of a tensor ([`super::Dual`]). Then tensors
+    /// are diagonal: what finds principal axes step by step, or leaves the type, takes those of the
+    /// coordinates.
     const DERIVES: bool = false;
 
     /// All lanes equal to `value`.

@@ -51,9 +51,9 @@ pub(crate) fn solver(comm: &Comm, text: &str) -> Solver<2> {
     setup::solver(comm, &problem).unwrap_or_else(|error| panic!("{error}"))
 }
 
-/// A piston of 50 kg sticks to a column without Poisson's effect, whose foot is held: with the column's stiffness
-/// `E π R² / L` and a third of its mass it oscillates as a mass on a spring. Masses and forces are those of the
-/// whole circumference.
+/// A piston of 50 kg sticks to a column without Poisson's effect, whose foot is held: with the column's
+/// stiffness `E π R² / L` and a third of its mass it oscillates as a mass on a spring. Masses and forces are
+/// those of the whole circumference.
 #[test]
 fn a_piston_on_a_column_is_a_mass_on_a_spring() {
     let (mass, young, radius, length, density, speed) = (50.0, 1e6, 0.1, 0.4, 100.0, 0.05);

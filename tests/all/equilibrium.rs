@@ -122,8 +122,9 @@ fn relaxes(scaling: &str) {
     });
 }
 
-/// A beam under a pressure that follows it, without ties of its surface, which is stopped every few steps once near equilibrium:
-/// steps stay as long as the material allows, the run comes to its end, and says what is left.
+/// A beam under a pressure that follows it, without ties of its surface, which is stopped every few steps
+/// once near equilibrium: steps stay as long as the material allows, the run comes to its end, and says what
+/// is left.
 #[test]
 fn stops_do_not_shorten_the_steps() {
     let job = "version = 1\ndimension = 2\n[domain]\nsize = [6.375, 5.625]\nroot_edge = 0.375\n[boundaries]\nx_min = { kind = 'sticky' }\n\

@@ -95,9 +95,9 @@ fn impulses_are_those_of_the_definition_while_particles_split_and_merge() {
     }
 }
 
-/// A block, free in space, bears a pressure on all its surface as the same stress everywhere: it stays at rest to
-/// round-off, on equal cells and over a jump between cells, in the plane (without strain across it), in space and as a
-/// body of revolution.
+/// A block, free in space, bears a pressure on all its surface as the same stress everywhere: it stays at
+/// rest to round-off, on equal cells and over a jump between cells, in the plane (without strain across it),
+/// in space and as a body of revolution.
 #[test]
 fn uniform_pressure_is_borne_by_uniform_stress() {
     let load = "[[loads]]\nname = 'water'\nkind = 'pressure'\npressure = 100\n";
@@ -152,8 +152,8 @@ fn carried(solver: &Solver<2>, column: usize) -> f64 {
     sum.to_f64()
 }
 
-/// Areas: exact at the start, kept by all changes of the tree; the work of a force on points is force times way, particle
-/// by particle.
+/// Areas: exact at the start, kept by all changes of the tree; the work of a force on points is force times
+/// way, particle by particle.
 #[test]
 fn areas_are_kept_and_work_is_force_times_way() {
     if !ran_if_launched(keeps_areas) {

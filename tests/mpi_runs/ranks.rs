@@ -71,7 +71,8 @@ fn memory_is_foretold() {
     assert!((0.7..1.4).contains(&ratio), "{foretold} MB, {ratio} of what it took");
 }
 
-/// Exchanges with neighbours in a step of an elastic body: sums at nodes, the well filled cells of ties, and particles.
+/// Exchanges with neighbours in a step of an elastic body: sums at nodes, the well filled cells of ties, and
+/// particles.
 const EXCHANGES: f64 = 3.0;
 
 /// Bytes sent over the bytes that the surface between ranks needs, at most.

@@ -1,4 +1,4 @@
-//! What a criterion asks of the job that it is a part of.
+//! Questions of a criterion to the job that it is a part of.
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

@@ -237,8 +237,8 @@ fn plural(ranks: u32) -> String {
     if ranks == 1 { "1 rank".into() } else { format!("{ranks} ranks") }
 }
 
-/// Particles, surface and force of a load that particles carry, in words, with the whole circumference of rings;
-/// the force is that at `time`, s.
+/// Particles, surface and force of a load that particles carry, in words, with the whole circumference of
+/// rings; the force is that at `time`, s.
 fn carried_in_words<const D: usize>(totals: &CarriedTotals, is_ring: bool, time: f64) -> String {
     let area = match (totals.area, D) {
         (Some(area), 2) if !is_ring => format!(", {} of surface", quantity(area, "m")),

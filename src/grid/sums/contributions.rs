@@ -1,4 +1,4 @@
-//! What adds to the sum of a block: arenas of own bins, bins outside their leaves, sums of other ranks.
+//! Contributions to the sum of a block: arenas of own bins, bins outside their leaves, sums of other ranks.
 use std::ops::RangeInclusive;
 
 use super::received::ReceivedSums;

@@ -59,8 +59,8 @@ impl<const D: usize> Finder<D> {
         around + size_of_val(&self.around[..]) + size_of_val(&self.sums[..])
     }
 
-    /// Finds the ties of a velocity field, with those of the step before; see [`super::Ties::tie`]. Nodes between
-    /// cells on both sides have ties if `spans_gaps`.
+    /// Finds the ties of a velocity field, with those of the step before; see [`super::Ties::tie`]. Nodes
+    /// between cells on both sides have ties if `spans_gaps`.
     pub(super) fn find(
         &mut self,
         plan: &GridPlan<D>,

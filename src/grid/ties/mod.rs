@@ -87,8 +87,8 @@ impl<const D: usize> Ties<D> {
         self.words.share(&plan.tree, own, &mut self.filled);
     }
 
-    /// Not collective. Tells the ties which nodes of blocks with mass are near what never moves; `find` is asked
-    /// once for each block.
+    /// Not collective. Tells the ties which nodes of blocks with mass are near what never moves; `find` is
+    /// asked once for each block.
     pub fn note_still(&mut self, fields: &NodeFields<D>, find: impl Fn(usize) -> u64 + Sync) {
         let blocks = self.near_still.par_iter_mut().zip(&fields.active).enumerate().with_min_len(16);
         let new = blocks.filter(|(_, (known, active))| **active && known.is_none());
@@ -117,8 +117,8 @@ impl<const D: usize> Ties<D> {
     }
 
     /// Not collective. The ties of a velocity field, whose rows hold masses; `held` as in [`Ties::tie`], where
-    /// nodes on faces of the domain are not fixed for that alone. Nodes between two bodies have ties as well: free,
-    /// they would have next to no stiffness.
+    /// nodes on faces of the domain are not fixed for that alone. Nodes between two bodies have ties as well:
+    /// free, they would have next to no stiffness.
     pub fn search(
         &mut self,
         plan: &GridPlan<D>,

@@ -106,8 +106,8 @@ impl Progress {
         };
     }
 
-    /// How the load step that is done went: Newton and linear iterations, and the unbalanced force over that of
-    /// loads or stress.
+    /// How the load step that is done went: Newton and linear iterations, and the unbalanced force over that
+    /// of loads or stress.
     pub fn effort(&mut self, newton: u32, linear: u32, unbalanced: f64) {
         self.effort = format!("  {newton} Newton, {linear} linear iterations, unbalanced {unbalanced:.1e}");
     }

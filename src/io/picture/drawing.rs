@@ -1,4 +1,4 @@
-//! What a picture is drawn from.
+//! Input of a picture.
 use super::camera::Bounds;
 use super::scene::Splat;
 use super::solids::Solid;

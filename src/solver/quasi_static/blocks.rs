@@ -122,7 +122,7 @@ pub(super) fn without_held<const D: usize>(block: &mut [[f64; D]; D], row: u8, c
 /// A level of multigrid.
 pub(super) struct Level<const D: usize> {
     pub(super) matrix: Blocks<D>,
-    /// What is held at each node, a bit for each axis.
+    /// Held axes of each node, a bit each.
     pub(super) held: Vec<u8>,
     /// Of each node, the nodes of the next coarser level with their weights; none on the coarsest.
     pub(super) to: Vec<Weights>,
@@ -149,7 +149,7 @@ impl<const D: usize> Level<D> {
         self.matrix.reduced(&self.to, &self.from, held)
     }
 
-    /// What the smoother needs of the present matrix.
+    /// Prepares the smoother for the present matrix.
     pub(super) fn prepare(&mut self) {
         let (matrix, count) = (&self.matrix, self.matrix.len());
         let diagonals = (0..count).into_par_iter().with_min_len(ROWS);

@@ -25,7 +25,7 @@ pub(super) fn whole_unit(greatest: f64) -> f64 {
 
 /// Nodes of all ranks.
 pub(super) struct Everywhere<const D: usize> {
-    /// What nodes follow that are tied: unknowns by place, with axes on which they do not follow.
+    /// Of each tied node, the unknowns that it follows, by place, with axes on which they do not follow.
     tied: FxHashMap<Lattice<D>, Vec<(Lattice<D>, u8, f64)>>,
     /// Places of the unknowns with what is held, in the order of their numbers.
     pub(super) free: Vec<(Lattice<D>, u8)>,

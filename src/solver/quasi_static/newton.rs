@@ -17,8 +17,8 @@ const ITERATIONS: u32 = 25;
 const LINEAR: u32 = 1000;
 /// Halvings of a correction.
 const HALVINGS: u32 = 6;
-/// Corrections of a step that are made in full though no share of them lets the residual fall: where the law has
-/// an edge, a state on it may have no direction that does, and the next correction knows the other side.
+/// Corrections of a step that are made in full though no share of them lets the residual fall: where the law
+/// has an edge, a state on it may have no direction that does, and the next correction knows the other side.
 const FORCED: u32 = 3;
 /// Residual up to which they are, over the forces: farther off, a shorter step is safer.
 const NEARLY_BALANCED: f64 = 1e-3;

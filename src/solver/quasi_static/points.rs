@@ -10,8 +10,8 @@
 //! with δτ by the tangent of the law. F-bar is a projection of ΔF; the same projection of P is its adjoint, so
 //! the stiffness of an elastic body is symmetric with it as well.
 //!
-//! While the strength is reduced, forces balance on the shape of the start: `P = τ`, and ΔF is `1 + ε` with the
-//! symmetric part ε of the gradients.
+//! While the strength is reduced, forces balance on the shape of the start: `P = τ`, and ΔF is `1 + ε` with
+//! the symmetric part ε of the gradients.
 use rayon::prelude::*;
 
 use crate::grid::leaf_geometry::{LeafCells, leaf_box};

@@ -144,8 +144,8 @@ pub struct Effort {
     pub residual: f64,
     /// Attempts at the step that were given up.
     pub cuts: u32,
-    /// Place of the node with the greatest unbalanced force of an attempt that failed, m from the lower corner of
-    /// the domain.
+    /// Place of the node with the greatest unbalanced force of an attempt that failed, m from the lower
+    /// corner of the domain.
     pub worst: [f64; 3],
 }
 

@@ -9,8 +9,8 @@
 //! A force on a surface acts at the surface, with the moment `M = f ⊗ d` by its way d from the centre of the
 //! particle: to first order nodes get `Δt (w f + M ∇w)`, so that uniform stress balances a uniform load to
 //! round-off where boxes tile cells. At the centres it would leave half of the load in the outermost row. The
-//! second term is that of a stress `−M / V₀`, which the particle has for P2G: of M the symmetric part, and all
-//! of it in load steps. The work is `f · Δx + Δt M : ∇v` with the displacement Δx of the particle.
+//! second term is that of a stress `−M / V₀`, which the particle has for P2G: of M the symmetric part, and
+//! all of it in load steps. The work is `f · Δx + Δt M : ∇v` with the displacement Δx of the particle.
 use rayon::prelude::*;
 
 use crate::exact_sum::ExactSum;
@@ -54,8 +54,8 @@ fn numbers<const D: usize>(chunk: &Chunk<D>, carried: &Carried<D>, p: usize) -> 
     numbers.iter().any(|&number| number != 0.0).then_some(numbers)
 }
 
-/// Place (m) at which a force on the surface is evaluated for a particle, whose box has these half widths (m): at
-/// the surface if the force depends on the place.
+/// Place (m) at which a force on the surface is evaluated for a particle, whose box has these half widths
+/// (m): at the surface if the force depends on the place.
 fn surface_at<const D: usize>(
     chunk: &Chunk<D>,
     carried: &Carried<D>,
@@ -67,8 +67,8 @@ fn surface_at<const D: usize>(
     std::array::from_fn(|a| x[a] + way[a])
 }
 
-/// Adds `−M / V₀` with the moments M of some forces to the stress that a particle has for P2G. Returns what it
-/// was.
+/// Adds `−M / V₀` with the moments M of some forces to the stress that a particle has for P2G. Returns what
+/// it was.
 fn push_stress<const D: usize>(
     chunk: &mut Chunk<D>,
     p: usize,
@@ -179,8 +179,8 @@ impl<const D: usize> Pushing<'_, D> {
         mass / (density * full.mul_add(saturated - 1.0, 1.0))
     }
 
-    /// Force of a load on a particle of this mass (kg) in a leaf with cells of this edge (m), N, if it has any, and
-    /// its moment about the centre, N m. Water needs the half widths of its box, m.
+    /// Force of a load on a particle of this mass (kg) in a leaf with cells of this edge (m), N, if it has
+    /// any, and its moment about the centre, N m. Water needs the half widths of its box, m.
     fn force(
         &self,
         chunk: &Chunk<D>,

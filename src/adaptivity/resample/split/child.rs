@@ -1,4 +1,4 @@
-//! What every part of a particle takes from it.
+//! State that every part of a particle takes from it.
 use crate::adaptivity::resample::{Setting, ids};
 use crate::particle::chunk::{Chunk, Tag};
 use crate::particle::halvings;
