@@ -26,7 +26,25 @@ fn ratio_in_tile<const D: usize>(tile: &[[f64; TILE]], lane: usize) -> f64 {
 
 /// [`volume_ratio`] of the particles of a tile; values behind the last particle are undefined.
 pub fn volume_ratios<const D: usize>(tile: &[[f64; TILE]]) -> [f64; TILE] {
-    std::array::from_fn(|lane| ratio_in_tile::<D>(tile, lane))
+    // Lane by lane without branches and calls, which the compiler turns into vectors.
+    let mut ratios = [0.0; TILE];
+    let column = |component: usize| &tile[Layout::<D>::LEFT_CAUCHY_GREEN + component];
+    let [xx, yy, zz, xy] = [0, 1, 2, 3].map(column);
+    if D == 2 {
+        for (lane, ratio) in ratios.iter_mut().enumerate() {
+            *ratio = elastic_ratio([xx[lane], yy[lane], zz[lane], xy[lane], 0.0, 0.0]);
+        }
+    } else {
+        let [xz, yz] = [4, 5].map(column);
+        for (lane, ratio) in ratios.iter_mut().enumerate() {
+            *ratio = elastic_ratio([xx[lane], yy[lane], zz[lane], xy[lane], yz[lane], xz[lane]]);
+        }
+    }
+    let plastic = &tile[Layout::<D>::PLASTIC_VOLUME];
+    if plastic.iter().any(|volume| *volume != 0.0) {
+        ratios.iter_mut().zip(plastic).for_each(|(ratio, volume)| *ratio = with_plastic(*ratio, *volume));
+    }
+    ratios
 }
 
 /// Volume, m³; in plane strain of one metre of thickness.
@@ -61,9 +79,19 @@ pub fn box_volume<const D: usize>(half: f64) -> f64 {
 /// det F: elastic part from the left Cauchy-Green tensor, plastic part from the second history
 /// variable (0 where a model has none).
 pub fn det_f(elastic: [f64; 6], plastic_volume: f64) -> f64 {
-    let [xx, yy, zz, xy, yz, xz] = elastic;
+    with_plastic(elastic_ratio(elastic), plastic_volume)
+}
+
+/// The elastic part of [`det_f`].
+#[inline(always)]
+fn elastic_ratio([xx, yy, zz, xy, yz, xz]: [f64; 6]) -> f64 {
     let determinant = xx * (yy * zz - yz * yz) - xy * (xy * zz - yz * xz) + xz * (xy * yz - yy * xz);
-    let elastic = determinant.sqrt();
+    determinant.sqrt()
+}
+
+/// An elastic part of [`det_f`] with the plastic one.
+#[inline(always)]
+fn with_plastic(elastic: f64, plastic_volume: f64) -> f64 {
     if plastic_volume == 0.0 { elastic } else { elastic * libm::exp(plastic_volume) }
 }
 
