@@ -31,19 +31,50 @@ pub fn height(volume: f64, slope: f64, cell: f64) -> f64 {
     if q <= 0.5 { 1.0 - 2.0 * q } else { q.mul_add(q, 2.0).sqrt() - q - 1.0 }
 }
 
-/// Where the material of a velocity field meets faces, and colliders that act on nodes. Later ones go before
-/// earlier ones where materials move together.
+/// Plastic strain from which on material counts as yielded: its boxes no longer tile, and the height that it
+/// has over nodes has errors of a tenth of a cell and more. Over such gaps the foot of a plastic rod that
+/// strikes a face would spread too little.
+const YIELDED: f64 = 0.02;
+
+/// Volume over slope and cell from which on material that has yielded is all there is.
+const ALL: f64 = 2.0;
+
+/// Share of the slope that material with this plastic strain gives: without slope it is all round the node
+/// and touches.
+pub fn elastic_share(plastic_strain: f64) -> f64 {
+    1.0 - (plastic_strain / YIELDED).clamp(0.0, 1.0)
+}
+
+/// Whether the material at a node with these sums (m³, m²) and cells of this edge (m) has yielded, as far as
+/// it ends towards the surface.
+pub fn has_yielded(volume: f64, slope: f64, cell: f64) -> bool {
+    volume > ALL * cell * slope.max(0.0)
+}
+
+/// Where the material of a velocity field meets faces, and colliders that act on nodes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Meets {
     /// At its surface, once it has moved over the gap.
     #[default]
     Surface,
+    /// At its surface as long as it is elastic, wherever it is at the nodes once it has yielded: metals and
+    /// clay.
+    Firm,
     /// Wherever it is, at the feet of the nodes inside colliders: fluids. Over gaps water would gather at
     /// walls.
     Feet,
-    /// Wherever it is, at the nodes: material that yields. Over gaps the foot of a plastic rod that strikes a
-    /// face would spread too little.
+    /// Wherever it is, at the nodes: material whose strength comes from pressure or is lost in cracks.
     Nodes,
+}
+
+impl Meets {
+    /// Of two materials that move together: later ones go before earlier ones, but for fluids with what yields.
+    pub fn together(self, other: Self) -> Self {
+        match [self.min(other), self.max(other)] {
+            [Self::Firm, Self::Feet] => Self::Nodes,
+            [_, later] => later,
+        }
+    }
 }
 
 /// What a surface asks of the velocity of material at it in a step.

@@ -36,6 +36,11 @@ impl Angle {
         Self { sine: libm::sin(angle), cosine: libm::cos(angle), softens: (first - last).to_radians() }
     }
 
+    /// Whether it is zero from the start to the residual state.
+    pub(super) fn is_zero(self) -> bool {
+        self.sine == 0.0 && self.softens == 0.0
+    }
+
     /// Sine and cosine once a share `lost`, from 0 to 1, of the possible decrease has occurred.
     #[inline(always)]
     pub(super) fn softened<V: Vector>(self, lost: V) -> [V; 2] {

@@ -62,6 +62,10 @@ pub trait Material: std::fmt::Debug + Send + Sync {
     /// alone.
     fn is_fluid(&self) -> bool;
 
+    /// Whether it is elastic up to a yield stress that does not depend on the pressure: metals, and clay that
+    /// is not drained.
+    fn is_firm(&self) -> bool;
+
     /// Whether a fluid bears tension.
     fn bears_tension(&self) -> bool;
 
@@ -141,6 +145,10 @@ impl<L: Law> Material for L {
 
     fn is_fluid(&self) -> bool {
         Law::is_fluid(self)
+    }
+
+    fn is_firm(&self) -> bool {
+        Law::is_firm(self)
     }
 
     fn bears_tension(&self) -> bool {

@@ -254,6 +254,10 @@ impl Law for Shocked {
         ((self.bulk + 4.0 / 3.0 * elastic.shear_modulus()) / elastic.density()).sqrt()
     }
 
+    fn is_firm(&self) -> bool {
+        true
+    }
+
     fn history_names(&self) -> &'static [&'static str] {
         &["plastic_strain", "plastic_volume", "heat"]
     }

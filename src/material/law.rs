@@ -64,6 +64,11 @@ pub trait Law: std::fmt::Debug + Send + Sync {
         false
     }
 
+    /// See [`super::Material::is_firm`].
+    fn is_firm(&self) -> bool {
+        false
+    }
+
     /// See [`super::Material::bears_tension`].
     fn bears_tension(&self) -> bool {
         true

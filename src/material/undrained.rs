@@ -207,6 +207,10 @@ impl Material for Saturated {
         false
     }
 
+    fn is_firm(&self) -> bool {
+        self.skeleton.is_firm()
+    }
+
     fn bears_tension(&self) -> bool {
         self.skeleton.bears_tension()
     }

@@ -110,13 +110,14 @@ pub fn meets<const D: usize>(problem: &Problem<D>, field: u8, stage: usize) -> M
             let material = setup.build();
             match (material.is_fluid(), material.is_plastic()) {
                 (true, _) => Meets::Feet,
+                (false, true) if material.is_firm() => Meets::Firm,
                 (false, true) => Meets::Nodes,
                 (false, false) => Meets::Surface,
             }
         });
-        materials.max().unwrap_or_default()
+        materials.reduce(Meets::together).unwrap_or_default()
     };
-    there.map(of_body).max().unwrap_or_default()
+    there.map(of_body).reduce(Meets::together).unwrap_or_default()
 }
 
 /// Density of all undeformed material that has moved with a velocity field so far, kg/m³; `None` where it

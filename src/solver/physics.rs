@@ -241,7 +241,7 @@ impl<const D: usize> Physics<D> {
     pub(in crate::solver) fn has_ties(&self, field: usize) -> bool {
         match self.ties {
             Ties::None => false,
-            Ties::Elastic => self.meets(field) == Meets::Surface,
+            Ties::Elastic => matches!(self.meets(field), Meets::Surface | Meets::Firm),
             Ties::All => true,
         }
     }
@@ -253,7 +253,14 @@ impl<const D: usize> Physics<D> {
 
     /// Whether the material of a velocity field moves freely over the gap between it and a surface.
     pub(in crate::solver) fn moves_over_gaps(&self, field: usize) -> bool {
-        self.meets(field) == Meets::Surface
+        self.meets(field) == Meets::Surface || self.is_firm(field)
+    }
+
+    /// Whether it does as long as it is elastic. Sums that have to tell what has yielded say neither the area of
+    /// the material nor where bodies meet.
+    pub(in crate::solver) fn is_firm(&self, field: usize) -> bool {
+        let is_alone = self.body_contacts.fields() == 1 && !self.has_walls_by_area();
+        self.meets(field) == Meets::Firm && is_alone
     }
 
     /// Whether a collider acts on a velocity field at the feet of the nodes inside it, in this stage. Cohesion
@@ -265,6 +272,7 @@ impl<const D: usize> Physics<D> {
             (Meets::Feet, _) => true,
             (_, Contact::Sticky) => false,
             (Meets::Surface, _) => true,
+            (Meets::Firm, law) => self.is_firm(field) || law.acts_by_area(),
             (Meets::Nodes, law) => law.acts_by_area(),
         };
         collider.acts_on_nodes() && has_feet

@@ -214,8 +214,8 @@ fn held_at_nodes<const D: usize>(problem: &Problem<D>) -> Option<String> {
     let of_colliders = problem.colliders.iter().filter(|collider| collider.acts_on == ActsOn::Nodes);
     let of_colliders = of_colliders.map(|collider| collider.contact != Contact::Sticky);
     let of_faces = problem.stages.iter().flat_map(|stage| stage.faces.as_flattened()).flatten();
-    let all_faces = problem.faces.as_flattened().iter().chain(of_faces).map(|face| face.has_gap());
-    if !of_colliders.chain(all_faces).any(|acts| acts) {
+    let of_each_face = problem.faces.as_flattened().iter().chain(of_faces);
+    if !of_colliders.chain(of_each_face.clone().map(|face| face.has_gap())).any(|acts| acts) {
         return None;
     }
     let last = problem.stages.len().saturating_sub(1);
@@ -224,7 +224,12 @@ fn held_at_nodes<const D: usize>(problem: &Problem<D>) -> Option<String> {
     let field_of_body = &problem.body_contacts.field_of_body;
     let field = |body: usize| field_of_body.get(body).map_or(0, |&field| usize::from(field));
     let bodies = problem.bodies.iter().enumerate();
-    let bodies = bodies.filter(|(number, _)| meets[field(*number)] == Meets::Nodes);
+    let by_area = |contact: &Contact| contact.acts_by_area();
+    let is_alone = problem.body_contacts.fields() == 1
+        && !problem.colliders.iter().any(|collider| by_area(&collider.contact))
+        && !of_each_face.clone().any(by_area);
+    let at_nodes = |meets: Meets| meets == Meets::Nodes || (meets == Meets::Firm && !is_alone);
+    let bodies = bodies.filter(|(number, _)| at_nodes(meets[field(*number)]));
     let names: Vec<String> = bodies.map(|(_, body)| excerpt(&body.name, NAME).into()).collect();
     match names.len() {
         0 => None,

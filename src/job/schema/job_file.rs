@@ -398,8 +398,8 @@ pub struct Numerics {
     #[serde(default)]
     pub f_bar: bool,
     /// Whether nodes at the surface that belong to no cell at least half full move with the plane through the corners of the nearest such
-    /// cell. Left free, they take the stress of the outermost particles, and bent bodies are too soft. By default those of elastic bodies
-    /// do, in plane strain and in space; bodies that touch material that yields or flows count as elastic if `[[contact]]` parts them from it.
+    /// cell. Left free, they take the stress of the outermost particles, and bent bodies are too soft. By default those of elastic bodies,
+    /// metals and clay do, in plane strain and in space, if `[[contact]]` parts them from sand, snow and fluids.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub tied_surfaces: Option<bool>,
     /// Artificial viscosity against compression that is too quick for the cells (von Neumann and Richtmyer 1950): without, shocks ring, and

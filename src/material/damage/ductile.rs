@@ -229,6 +229,10 @@ impl Law for Ductile {
         (a[INDEX] - b[INDEX]).abs() <= ALIKE && (damage(a) - damage(b)).abs() <= ALIKE
     }
 
+    fn is_firm(&self) -> bool {
+        true
+    }
+
     fn has_failed(&self, history: &[f64; HISTORIES]) -> bool {
         history[INDEX] >= FAILED.mul_add(self.softening, 1.0)
     }

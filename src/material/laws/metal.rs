@@ -131,6 +131,10 @@ impl Law for VonMises {
         self.curve.initial_history()
     }
 
+    fn is_firm(&self) -> bool {
+        true
+    }
+
     fn softens(&self) -> bool {
         self.curve.softens()
     }

@@ -470,6 +470,11 @@ impl Law for MohrCoulomb {
         self.0.cohesion.initial_history()
     }
 
+    /// Without friction it is Tresca's law.
+    fn is_firm(&self) -> bool {
+        self.0.friction.is_zero()
+    }
+
     fn softens(&self) -> bool {
         self.0.cohesion.softens()
     }
@@ -507,6 +512,10 @@ impl<const HARDENS: bool> Law for Only<HARDENS> {
 
     fn initial_history(&self) -> [f64; HISTORIES] {
         Law::initial_history(&self.0)
+    }
+
+    fn is_firm(&self) -> bool {
+        Law::is_firm(&self.0)
     }
 
     fn softens(&self) -> bool {

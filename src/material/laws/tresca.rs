@@ -96,6 +96,10 @@ impl Law for Tresca {
         Law::initial_history(&self.0)
     }
 
+    fn is_firm(&self) -> bool {
+        true
+    }
+
     fn softens(&self) -> bool {
         Law::softens(&self.0)
     }

@@ -181,7 +181,7 @@ impl<const D: usize> Physics<D> {
     }
 
     /// Whether any face or collider has a law by the area of the material at it.
-    pub(super) fn has_walls_by_area(&self) -> bool {
+    pub(in crate::solver) fn has_walls_by_area(&self) -> bool {
         let of_colliders = self.colliders.iter().map(|collider| collider.contact);
         self.faces.iter().flatten().copied().chain(of_colliders).any(Contact::acts_by_area)
     }

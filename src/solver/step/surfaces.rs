@@ -4,6 +4,7 @@
 //! way of masses through bins, sums over ranks and constrained nodes; the rest of the grid pays nothing.
 use rayon::prelude::*;
 
+use crate::boundary::gap::elastic_share;
 use crate::geometry::Aabb;
 use crate::grid::mask::{arena_overlap, bits, offset, offset_count};
 use crate::grid::plan::{GridPlan, NO_BLOCK};
@@ -28,13 +29,14 @@ fn box_of_nodes<const D: usize>(plan: &GridPlan<D>, block: usize, nodes: u64) ->
 
 /// Makes `copy` the particles of a group in a box, which scatter volumes in place of masses, and gradients of
 /// volumes in place of the impulse of stress over 1 s. Velocities and affine states of a copy are zero.
-/// Returns of which particles these are copies.
+/// What has yielded has no gradient where material `is_firm`. Returns of which particles these are copies.
 fn copy_solids<const D: usize>(
     copy: &mut Chunk<D>,
     chunk: &Chunk<D>,
     group: Option<&Group<'_>>,
     aabb: &Aabb<D>,
     columns: &[usize],
+    is_firm: bool,
 ) -> Vec<u32> {
     let members = members_in(chunk, group, aabb);
     copy.gather_columns(chunk, &members, columns);
@@ -43,7 +45,8 @@ fn copy_solids<const D: usize>(
         let ratios = volume_ratios::<D>(tile);
         for (lane, ratio) in ratios.into_iter().enumerate() {
             tile[Layout::<D>::MASS][lane] = box_volume::<D>(tile[Layout::<D>::HALF][lane]) * ratio;
-            (0..3).for_each(|c| tile[Layout::<D>::STRESS + c][lane] = -ratio);
+            let share = if is_firm { elastic_share(tile[Layout::<D>::PLASTIC_STRAIN][lane]) } else { 1.0 };
+            (0..3).for_each(|c| tile[Layout::<D>::STRESS + c][lane] = -ratio * share);
         }
     }
     members
@@ -100,7 +103,9 @@ impl<const D: usize> Solver<D> {
             let group = solver.physics.group(field);
             let (widths, scheme) = (solver.physics.widths(&solver.grid.plan), solver.physics.scheme());
             let plan = &solver.grid.plan;
-            let columns: Vec<usize> = domain::columns::<D>().collect();
+            let is_firm = solver.physics.is_firm(field);
+            let yielded = is_firm.then_some(Layout::<D>::PLASTIC_STRAIN);
+            let columns: Vec<usize> = domain::columns::<D>().chain(yielded).collect();
             let Solids { copies, members, field: geometry } = &mut solids[field];
             let leaves = copies.par_iter_mut().zip(members).zip(&solver.chunks).zip(near).enumerate();
             leaves.with_min_len(16).for_each(|(leaf, (((copy, members), chunk), near))| {
@@ -110,8 +115,14 @@ impl<const D: usize> Solver<D> {
                 }
                 let cell = plan.finest_cell(leaf);
                 let half = widths.greatest_of_wide(chunk, cell).max(0.5 * cell);
-                *members =
-                    copy_solids(copy, chunk, group.as_ref(), &near.grown(half * (1.0 + MARGIN)), &columns);
+                *members = copy_solids(
+                    copy,
+                    chunk,
+                    group.as_ref(),
+                    &near.grown(half * (1.0 + MARGIN)),
+                    &columns,
+                    is_firm,
+                );
             });
             solver.grid.swap(geometry);
             let of_field = solver.grid.sort(&mut solver.phases, copies, (&widths, scheme.coordinates), None);

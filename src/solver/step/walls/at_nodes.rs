@@ -1,12 +1,12 @@
 //! Nodes that colliders hold themselves, not at their feet.
 //!
-//! These are the nodes inside `sticky` colliders for solids, those inside all colliders for material that
-//! yields, and those behind a surface that another collider covers or comes near to. Feet of both surfaces
+//! These are the nodes inside `sticky` colliders for solids, those inside all colliders for material that has
+//! yielded, and those behind a surface that another collider covers or comes near to. Feet of both surfaces
 //! would be in one cell, and if the colliders move against each other, no velocity of its corners obeys both.
 use rayon::prelude::*;
 
 use crate::boundary::motion::Rate;
-use crate::boundary::{Collider, ColliderState, Contact};
+use crate::boundary::{Collider, ColliderState, Contact, gap};
 use crate::exact_sum::ExactSum;
 use crate::grid::mask::{bits, block_nodes};
 use crate::kernel::Row;
@@ -44,6 +44,13 @@ pub(super) fn is_at_another<const D: usize>(
     })
 }
 
+/// Sums by which a node behind this surface tells whether its material has yielded, by its row.
+pub(super) fn has_yielded<const D: usize>(sums: &[Row], row: usize, plane: &Plane<D>, cell: f64) -> bool {
+    let of_node = sums[row].0;
+    let slope = -(0..D).fold(0.0, |sum, a| of_node[a].mul_add(plane.normal[a], sum));
+    gap::has_yielded(of_node[3], slope, cell)
+}
+
 impl<const D: usize> Solver<D> {
     /// Not collective. Applies the conditions of colliders, in their order, to the real nodes that they hold
     /// themselves, of the velocity field numbered `field`, which is in the place of the first. Adds impulse
@@ -58,13 +65,15 @@ impl<const D: usize> Solver<D> {
         let colliders = &physics.colliders;
         let on_nodes = || colliders.iter().filter(|collider| collider.acts_on_nodes());
         let at_feet = |collider: &Collider<D>| physics.acts_at_feet(field, collider);
-        let is_any = on_nodes().count() > 1 || on_nodes().any(|collider| !at_feet(collider));
+        let firm = physics.is_firm(field).then_some(field);
+        let is_any =
+            on_nodes().count() > usize::from(firm.is_none()) || on_nodes().any(|collider| !at_feet(collider));
         if self.grid.walls.known_over.is_none() || !is_any {
             return;
         }
         let grid = &mut self.grid;
         self.phases.time(Phase::Nodes, || {
-            for touch in hold(grid, colliders, states, rates, at_feet) {
+            for touch in hold(grid, colliders, states, rates, firm, at_feet) {
                 touch.book(colliders, states, sums);
             }
         });
@@ -91,15 +100,18 @@ pub(in crate::solver::step) fn obey<const D: usize>(
     Some(std::array::from_fn(|a| row.0[3] * (before[a] - row.0[a])))
 }
 
-/// Applies the conditions; returns impulses in the order of the nodes.
+/// Applies the conditions; returns impulses in the order of the nodes. `firm` is the number of the velocity
+/// field, where what has yielded is held at nodes.
 fn hold<const D: usize>(
     grid: &mut Grid<D>,
     colliders: &[Collider<D>],
     states: &[ColliderState<D>],
     rates: &[Rate<D>],
+    firm: Option<usize>,
     at_feet: impl Fn(&Collider<D>) -> bool + Sync,
 ) -> Vec<Touch<D>> {
-    let Grid { fields, inside_still, inside_moving, plan, .. } = grid;
+    let Grid { fields, inside_still, inside_moving, plan, solids, .. } = grid;
+    let sums = firm.map(|field| &solids[field].field.fields.rows[..]);
     let all = [&*inside_still, &*inside_moving];
     let blocks = fields.rows.par_chunks_mut(block_nodes(D)).zip(&plan.blocks).zip(&fields.active);
     let active = blocks.enumerate().with_min_len(32).filter(|(_, (_, active))| **active);
@@ -137,7 +149,10 @@ fn hold<const D: usize>(
             }
             let cell = plan.cell(block.level);
             for plane in &inside.planes {
-                if is_at_another(colliders, states, number, plane, cell) {
+                let row = index * block_nodes(D) + usize::from(plane.bit);
+                if sums.is_some_and(|sums| has_yielded(sums, row, plane, cell))
+                    || is_at_another(colliders, states, number, plane, cell)
+                {
                     hold(plane.bit.into(), &plane.normal);
                 }
             }

@@ -61,7 +61,7 @@ impl<const D: usize> LeafFeet<D> {
         inside: impl Fn(usize) -> &'a [Option<Inside<D>>],
         has_mass: impl Fn(usize) -> bool,
         acts: impl Fn(usize) -> bool,
-        acts_at_node: impl Fn(usize, &Plane<D>, f64) -> bool,
+        acts_at_node: impl Fn(usize, usize, &Plane<D>, f64) -> bool,
         normal: impl Fn(usize, &[f64; D]) -> [f64; D],
     ) -> Self {
         let number = plan.leaf_bins(leaf).start;
@@ -82,7 +82,7 @@ impl<const D: usize> LeafFeet<D> {
                 for plane in &inside.planes {
                     let row = block as usize * block_nodes(D) + usize::from(plane.bit);
                     let bit = plane.bit.into();
-                    if in_arena(bit) && has_mass(row) && !acts_at_node(collider, plane, cell) {
+                    if in_arena(bit) && has_mass(row) && !acts_at_node(collider, row, plane, cell) {
                         let node = [arena_index::<D>(index, bit), row];
                         found.feet.extend(Foot::new(plan, leaf, collider, plane.foot, plane.normal, node));
                     }

@@ -164,9 +164,10 @@ impl<const D: usize> Solver<D> {
         let Some(lengths) = self.grid.walls.known_over.filter(|_| self.has_feet(field)) else { return };
         let physics = &self.physics;
         let acts = |number: usize| physics.acts_at_feet(field, &physics.colliders[number]);
+        let firm = physics.is_firm(field).then_some(field);
         let mut all = self
             .phases
-            .time(Phase::Nodes, || self.grid.feet(&physics.colliders, &self.contacts.states, acts));
+            .time(Phase::Nodes, || self.grid.feet(&physics.colliders, &self.contacts.states, firm, acts));
         let mut other =
             self.grid.contact.take().unwrap_or_else(|| Box::new(VelocityField::new(&self.grid.plan)));
         self.grid.swap(&mut other);

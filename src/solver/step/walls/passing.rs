@@ -3,8 +3,6 @@
 //! Sums at nodes say how far the material over a face is, all of it together: a particle ahead of the others
 //! may be let through. So the way of a particle ends at the face, and the law of the face holds for its
 //! velocity. What this takes is booked as an impulse on the face.
-use crate::boundary::{Contact, Meets};
-use crate::kernel::Coordinates;
 use crate::particle::chunk::{Chunk, Layout, Tag};
 use crate::solver::physics::Physics;
 use crate::solver::state::Solver;
@@ -19,12 +17,7 @@ const LEAST: f64 = 1e-6;
 /// Faces of the domain that hold material back.
 #[derive(Clone, Copy)]
 pub(in crate::solver) struct Barrier<'a, const D: usize> {
-    faces: &'a [[Contact; 2]; D],
-    /// By velocity field, where its material meets faces. If not at its surface, no sum lets it through.
-    meets: &'a [Meets],
-    /// Velocity field of each body; empty where all move with one.
-    field_of_body: &'a [u8],
-    coordinates: Coordinates,
+    physics: &'a Physics<D>,
     /// Size of the domain, m.
     extent: [f64; D],
 }
@@ -32,25 +25,24 @@ pub(in crate::solver) struct Barrier<'a, const D: usize> {
 impl<'a, const D: usize> Barrier<'a, D> {
     /// Of a domain of this size, m.
     pub(in crate::solver) fn new(physics: &'a Physics<D>, extent: [f64; D]) -> Self {
-        let Physics { faces, meets, body_contacts, .. } = physics;
-        let (field_of_body, coordinates) = (&body_contacts.field_of_body[..], physics.coordinates);
-        Self { faces, meets, field_of_body, coordinates, extent }
+        Self { physics, extent }
     }
 
-    /// Whether it holds a particle with this tag.
+    /// Whether it holds a particle with this tag. If its material does not move over gaps, no sum lets it through.
     fn holds(&self, tag: u64) -> bool {
-        let field =
-            self.field_of_body.get(usize::from(Tag::unpack(tag).body)).map_or(0, |&field| field.into());
-        self.meets.get(field).is_none_or(|meets| *meets == Meets::Surface)
+        let body = usize::from(Tag::unpack(tag).body);
+        let field = self.physics.body_contacts.field_of_body.get(body).map_or(0, |&field| field.into());
+        self.physics.moves_over_gaps(field)
     }
 
     /// Faces that particles in a box (m) may come to in a step, as axis and side.
     fn beside(&self, (lower, upper): &([f64; D], [f64; D])) -> impl Iterator<Item = (usize, usize)> {
         let is_beside = |&(axis, side): &(usize, usize)| {
             let touches = if side == 0 { lower[axis] <= 0.0 } else { upper[axis] >= self.extent[axis] };
-            touches && self.faces[axis][side].has_gap()
+            touches && self.physics.faces[axis][side].has_gap()
         };
-        let is_any = self.meets.is_empty() || self.meets.contains(&Meets::Surface);
+        let is_any =
+            (0..self.physics.body_contacts.fields()).any(|field| self.physics.moves_over_gaps(field));
         (0..2 * D).filter(move |_| is_any).map(|face| (face / 2, face % 2)).filter(is_beside)
     }
 
@@ -72,7 +64,7 @@ impl<'a, const D: usize> Barrier<'a, D> {
         for (axis, side) in self.beside(leaf) {
             let extent = self.extent[axis];
             let above = |x: f64| if side == 0 { x } else { extent - x };
-            let law = self.faces[axis][side];
+            let law = self.physics.faces[axis][side];
             let normal: [f64; D] = std::array::from_fn(|a| match a == axis {
                 true => [1.0, -1.0][side],
                 false => 0.0,
@@ -80,7 +72,7 @@ impl<'a, const D: usize> Barrier<'a, D> {
             for (p, start) in start.iter().enumerate() {
                 let mut x = chunk.position(p);
                 let half = chunk.column(Layout::<D>::HALF)[p];
-                let close = CLOSE * self.coordinates.half_width(half, start[0]);
+                let close = CLOSE * self.physics.coordinates.half_width(half, start[0]);
                 let least = close.min(above(start[axis]).max(LEAST * close));
                 // One that was outside already, or is not a number, is for others to find.
                 let has_passed = above(x[axis]) < least && above(start[axis]) >= 0.0;
