@@ -62,6 +62,25 @@ SPACE: dict[str, Any] = {
 }
 
 
+# A ring of rubber that widens and sinks; a body of revolution.
+RINGS: dict[str, Any] = {
+    "dimension": 2,
+    "geometry": "axisymmetric",
+    "domain": {"size": [0.2, 0.2], "root_edge": 0.1},
+    "materials": [{"name": "rubber", "density": 1000, "model": "hencky", "young": 1e5, "poisson": 0.3}],
+    "bodies": [
+        {
+            "name": "ring",
+            "material": "rubber",
+            "shape": {"kind": "box", "min": [0.025, 0.05], "max": [0.1, 0.1]},
+            "velocity": [1.0, -0.5],
+        }
+    ],
+    "time": {"end": 0.002},
+    "output": {"fields": ["velocity", "stress", "volume_ratio"], "picture": False},
+}
+
+
 def program() -> str | None:
     """The program: of the environment, of this repository, or on the PATH."""
     built = [REPOSITORY / "target" / profile / "agimp" for profile in ("release", "debug")]
@@ -96,3 +115,9 @@ def plane(needs_program: str, tmp_path_factory: pytest.TempPathFactory) -> agimp
 def space(needs_program: str, tmp_path_factory: pytest.TempPathFactory) -> agimp.Results:
     """The run in space, whose outputs carry no restart state."""
     return agimp.run(agimp.job(SPACE, name="space"), where=tmp_path_factory.mktemp("space"))
+
+
+@pytest.fixture(scope="session")
+def rings(needs_program: str, tmp_path_factory: pytest.TempPathFactory) -> agimp.Results:
+    """The run of a body of revolution."""
+    return agimp.run(agimp.job(RINGS, name="rings"), where=tmp_path_factory.mktemp("rings"))

@@ -114,6 +114,29 @@ def test_meshes_show_particles_and_leaves(which: str, request: pytest.FixtureReq
     assert np.array_equal(leaves["level"], out.tree.level)
 
 
+def test_bodies_of_revolution_are_shown_in_space(rings: agimp.Results, plane: agimp.Results) -> None:
+    pytest.importorskip("pyvista")
+    out = rings[-1]
+    assert out.header.of_revolution and not plane[-1].header.of_revolution
+    section, whole, half = out.positions(), out.mesh(revolve="whole"), out.mesh(revolve="open")
+    radii = np.hypot(whole.points[:, 0], whole.points[:, 1])
+    assert set(np.round(radii, 6)) == set(np.round(section[:, 0], 6))
+    # As many as boxes of the section fill the volume of the ring: 0.05 m high, from 0.025 to 0.1 m.
+    edge = np.sqrt(0.075 * 0.05 / len(out))
+    assert whole.n_points * edge**3 == pytest.approx(np.pi * (0.1**2 - 0.025**2) * 0.05, rel=0.1)
+    assert np.all((half.points[:, 0] < 1e-12) | (half.points[:, 1] > -1e-12)) and half.n_points < 0.8 * whole.n_points
+    # Velocities point away from the axis as positions do, and traces of stress stay.
+    velocity, stress = whole["velocity"], whole["stress"]
+    across = whole.points[:, 0] * velocity[:, 1] - whole.points[:, 1] * velocity[:, 0]
+    assert np.allclose(across, 0.0, atol=1e-6)
+    traces = out.field("stress")[:, :3].sum(axis=1)
+    assert stress[:, :3].sum(axis=1).min() == pytest.approx(traces.min(), abs=1e-3 * np.abs(traces).max())
+    with pytest.raises(ValueError, match="found no bodies of revolution"):
+        plane[-1].mesh(revolve="whole")
+    with pytest.raises(ValueError, match="found revolve = 'half'; expected one of 'open', 'whole'"):
+        out.mesh(revolve="half")
+
+
 def test_damage_is_found(plane: agimp.Results, tmp_path: Path) -> None:
     whole = plane[-1]
     whole.verify()

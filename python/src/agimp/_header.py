@@ -26,7 +26,7 @@ class Header:
     format: int
     """Version of the layout of its restart state."""
     dimension: int
-    """2 (plane strain) or 3."""
+    """2 (plane strain, or bodies of revolution) or 3."""
     job_digest: int
     """Digest of the job."""
     origin: tuple[float, ...]
@@ -55,6 +55,8 @@ class Header:
     """Text of the job file; empty in files without it."""
     title: str
     """Title of the job; empty in files without it."""
+    of_revolution: bool
+    """Whether bodies are those of revolution: x is the radius, y the height."""
 
     @property
     def domain(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
@@ -142,6 +144,7 @@ def read_header(path: Path, file: Any) -> Header:
         bodies=names("bodies"),
         job=_job_text(file),
         title=text(attributes.get("title", "")),
+        of_revolution="axisymmetric" in names("count_names"),
     )
     if header.dimension not in (2, 3) or not len(header.origin) == len(header.roots) == header.dimension:
         raise FileRefused(f"{path}: the file is damaged: its header has {header.dimension} dimensions, {len(header.roots)} roots")

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from . import _fields, _frames, _meshes, _paths
+from . import _fields, _frames, _meshes, _paths, _revolve
 from ._errors import FileRefused
 from ._header import checksums, Header, opened, read_header, text
 from ._tree import Tree
@@ -140,14 +140,32 @@ class Output:
                     table[column] = _frames.categories(table[column], known)
         return table
 
-    def mesh(self, fields: Iterable[str] | None = None) -> pyvista.PolyData:
-        """The particles as points of a pyvista mesh, with the given fields, by default all. Needs pyvista."""
+    def mesh(self, fields: Iterable[str] | None = None, *, revolve: str | None = None) -> pyvista.PolyData:
+        """The particles as points of a pyvista mesh, with the given fields, by default all. Needs pyvista.
+
+        With `revolve`, "whole" or "open", bodies of revolution are in space: each particle next to itself about the axis,
+        all around or without the quarter where x > 0 and y < 0.
+        """
         chosen = self.fields if fields is None else tuple(fields)
         for name in chosen:
             self._known(name)
         points = self._read(_PLACES, 3)
         arrays = {name: self._read(self._sets[name]) for name in chosen}
+        if revolve is not None:
+            copies = self._copies(points[:, 0].astype(np.float64), revolve)
+            points, arrays = copies.places(points), {name: copies.values(of) for name, of in arrays.items()}
         return _meshes.points(points, arrays, self.header)
+
+    def _copies(self, radii: NDArray[np.float64], revolve: str) -> _revolve.Copies:
+        if not self.header.of_revolution:
+            raise ValueError(f'{self.path}: found no bodies of revolution; expected the output of a job with geometry = "axisymmetric"')
+        if revolve not in _revolve.SPANS:
+            raise ValueError(f"found revolve = {revolve!r}; expected one of {', '.join(map(repr, _revolve.SPANS))}")
+        if "half_width" not in self._sets:
+            raise FileRefused(f"{self.path}: holds no half widths; expected an output with `output.restart = true`")
+        # The state has half of the root of the volume of the undeformed ring.
+        halves = self._read(self._sets["half_width"]) / np.sqrt(2.0 * np.pi * radii)
+        return _revolve.Copies(radii, halves, _revolve.SPANS[revolve])
 
     @cached_property
     def tree(self) -> Tree:
