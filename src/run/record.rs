@@ -91,8 +91,9 @@ impl<'a, const D: usize> Recorder<'a, D> {
             history,
             telemetry,
             lines,
-            thrust: (comm.rank() == 0 && history::has_thrust(problem))
-                .then(|| Thrust::new(&problem.colliders, problem.size(), problem.root_edge)),
+            thrust: (comm.rank() == 0 && history::has_thrust(problem)).then(|| {
+                Thrust::new(&problem.colliders, problem.size(), problem.root_edge, problem.coordinates)
+            }),
             progress: Progress::new(options.speaks, time, problem.time.end, options.warnings.len()),
             last_row,
             last_values,

@@ -69,7 +69,8 @@ pub fn put_under_stress<const D: usize>(
         let material = &*materials[usize::from(material)];
         let [half] = chunk.read::<1>(Layout::<D>::HALF, p);
         let about = head(chunk, column, p, &problem.origin);
-        let stressed = at(problem, body, initial, material, (&x, half), about, &mut columns)
+        let section = problem.coordinates.half_width(half, x[0]);
+        let stressed = at(problem, body, initial, material, (&x, section), about, &mut columns)
             .map_err(|reason| fault(problem, usize::from(index), initial, &x, reason))?;
         let symmetric = |tensor: &[f64; 6]| tensor[..Layout::<D>::SYMMETRIC].to_vec();
         chunk.write(Layout::<D>::LEFT_CAUCHY_GREEN, p, &symmetric(&stressed.elastic));

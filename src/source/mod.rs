@@ -22,8 +22,10 @@ pub struct Source<const D: usize> {
     pub level: u8,
     /// Their distance, m.
     pub spacing: f64,
-    /// Mass of each, kg.
-    pub mass: f64,
+    /// Mass, kg, of the particles of a layer, by the lines of `entries`: rings have masses in proportion to their radii.
+    pub masses: Vec<f64>,
+    /// Half widths, m, of cubes (squares) of their volumes.
+    pub halves: Vec<f64>,
     /// Velocity, m/s.
     pub velocity: [f64; D],
     /// Where the particles of a layer enter, m: by the lines of the lattice, in lexicographic order.
@@ -154,15 +156,22 @@ impl<const D: usize> Source<D> {
         self.from <= own && own <= last
     }
 
-    /// Where the particles of a layer are at a time (s) after it has entered, m.
-    pub fn layer(&self, layer: u64, time: f64) -> impl Iterator<Item = [f64; D]> + '_ {
+    /// Mass of a whole layer, kg.
+    pub fn mass_of_layer(&self) -> f64 {
+        self.masses.iter().sum()
+    }
+
+    /// Where the particles of a layer are at a time (s) after it has entered, m, with the numbers of their lines.
+    pub fn layer(&self, layer: u64, time: f64) -> impl Iterator<Item = (usize, [f64; D])> + '_ {
         let way = time - self.start - self.own_time(layer);
         let all = self.entries.len() as u64;
         let count = self.total.saturating_sub(layer * all).min(all);
         let entries = self.entries.iter().zip(0..all);
         // The particles of an incomplete layer are spread over it.
         let chosen = entries.filter(move |(_, i)| (i + 1) * count / all > i * count / all);
-        chosen.map(move |(entry, _)| std::array::from_fn(|a| way.mul_add(self.velocity[a], entry[a])))
+        chosen.map(move |(entry, i)| {
+            (i as usize, std::array::from_fn(|a| way.mul_add(self.velocity[a], entry[a])))
+        })
     }
 }
 
@@ -180,7 +189,8 @@ mod tests {
             material: 0,
             level: 0,
             spacing: 0.125,
-            mass: 1.0,
+            masses: vec![1.0; entries.len()],
+            halves: vec![0.0625; entries.len()],
             velocity,
             entries,
             period: 0.1,
@@ -213,7 +223,7 @@ mod tests {
         assert_eq!([0, 1, 2].map(|layer| source.layer(layer, 0.8).count()), [4, 4, 2]);
         assert_eq!([0.5, 0.55, 0.65, 9.0].map(|t| source.particles_before(t)), [0, 4, 8, 10]);
         // The last two are spread over the layer, and it has moved since.
-        let last: Vec<_> = source.layer(2, 0.75).collect();
+        let last: Vec<_> = source.layer(2, 0.75).map(|(_, x)| x).collect();
         assert_eq!(last.iter().map(|x| x[0]).collect::<Vec<_>>(), [1.1875, 1.4375]);
         assert!((last[0][1] - (2.1875 - 0.05)).abs() < 1e-15);
         assert!(!source.conveys(0.4) && source.conveys(0.5) && source.conveys(0.9) && !source.conveys(1.1));

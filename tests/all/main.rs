@@ -39,6 +39,7 @@ mod quasi_static;
 mod report;
 mod rigid_contact;
 mod rings;
+mod rings_of_water;
 mod seepage;
 mod shocks;
 mod soak;

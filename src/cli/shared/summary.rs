@@ -259,7 +259,7 @@ fn carried_in_words<const D: usize>(totals: &CarriedTotals, is_ring: bool, time:
 fn source_in_words<const D: usize>(source: &Source<D>) -> String {
     let velocity: Vec<String> = source.velocity.iter().map(|&v| quantity(v, "m/s")).collect();
     let count = source.entries.len();
-    let rate = quantity(source.mass * count as f64 / source.period, "kg/s");
+    let rate = quantity(source.mass_of_layer() / source.period, "kg/s");
     let all = if source.total == u64::MAX {
         String::new()
     } else {

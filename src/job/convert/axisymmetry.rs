@@ -1,15 +1,17 @@
 //! Axisymmetric jobs: what they cannot have.
 //!
 //! Some settings have no meaning for bodies of revolution, such as gravity across the axis; the others act on
-//! planar sections only so far. Each is refused by name, all in one list.
+//! planar sections only so far. Each is refused by name, all in one list; `docs/design/axisymmetry.md` has the
+//! reasons.
 use super::checks::Checks;
 use crate::boundary::Collider as Solid;
 use crate::geometry::written::Shape;
 use crate::job::parse::source::Path;
-use crate::job::problem::{CollapseLaw, Coordinates, Field, MaterialSetup};
+use crate::job::problem::{CollapseLaw, Coordinates, Field};
 use crate::job::schema::colliders::{Collider, Motion, MotionRecord, Row};
 use crate::job::schema::common::{AxisName, Spin};
 use crate::job::schema::job_file::{self as file, Boundaries, Face, Geometry, JobFile, Quantity};
+use crate::job::schema::probes::FaceName;
 
 /// Coordinates of a job.
 pub(super) fn coordinates(checks: &mut Checks, file: &JobFile) -> Coordinates {
@@ -31,12 +33,7 @@ pub(super) fn with_axis(file: &JobFile) -> JobFile {
 }
 
 /// Adds faults for all that an axisymmetric job cannot have.
-pub(super) fn check<const D: usize>(
-    checks: &mut Checks,
-    file: &JobFile,
-    materials: &[MaterialSetup],
-    colliders: &[Solid<D>],
-) {
+pub(super) fn check<const D: usize>(checks: &mut Checks, file: &JobFile, colliders: &[Solid<D>]) {
     let root = Path::default();
     let mut refuse = checks.refuse_in("an axisymmetric job");
     let starts = file.domain.min.as_ref().and_then(|min| min.0.first()).is_some_and(|&x| x != 0.0);
@@ -62,15 +59,6 @@ pub(super) fn check<const D: usize>(
     });
     for (path, boundaries) in std::iter::once((root.key("boundaries"), &file.boundaries)).chain(changed) {
         faces(boundaries, &path, &mut refuse);
-    }
-    for (i, material) in materials.iter().enumerate() {
-        let is_fluid = material.build().is_fluid();
-        refuse(
-            is_fluid,
-            root.key("materials").index(i).key("model"),
-            "a fluid",
-            "a solid or granular material",
-        );
     }
     for (i, body) in file.bodies.iter().enumerate() {
         let here = root.key("bodies").index(i);
@@ -113,8 +101,25 @@ pub(super) fn check<const D: usize>(
         "\"volume\" or \"cell\"",
     );
     refuse(file.numerics.tied_surfaces == Some(true), numerics.key("tied_surfaces"), "tied surfaces", "none");
-    refuse(file.water.is_some(), root.key("water"), "water in the pores", "none");
-    refuse(!file.sources.is_empty(), root.key("sources"), "sources", "bodies");
+    let heads =
+        file.water.iter().filter_map(|water| water.seepage.as_ref()).flat_map(|seepage| &seepage.heads);
+    for (i, head) in heads.enumerate() {
+        refuse(
+            matches!(head.face, Some(FaceName::XMin)),
+            root.key("water").key("seepage").key("heads").index(i).key("face"),
+            "a head on the axis",
+            "another face or a shape: a well about the axis has a radius",
+        );
+    }
+    for (i, source) in file.sources.iter().enumerate() {
+        let across = source.velocity.0.first().is_some_and(|&x| x != 0.0);
+        refuse(
+            across,
+            root.key("sources").index(i).key("velocity").index(0),
+            "a source across the axis",
+            "0: rings that move along the radius do not keep their volume at one velocity",
+        );
+    }
     for (i, field) in file.output.chosen().iter().enumerate() {
         refuse(
             matches!(field, Field::Strain | Field::EquivalentStrain),

@@ -161,7 +161,7 @@ fn problem<const D: usize>(
         load_stages.push(water_stages);
         load_places.push(checks.place(&root.key("water")));
     }
-    let context = sources::Context { file, space: &space, tree: &tree, root_edge };
+    let context = sources::Context { file, space: &space, tree: &tree, root_edge, coordinates };
     let (sources, fed): (Vec<_>, Vec<_>) =
         sources::sources(checks, &context, &root.key("sources"))?.into_iter().unzip();
     bodies.extend(fed);
@@ -185,7 +185,7 @@ fn problem<const D: usize>(
         None => None,
     };
     if is_ring && checks.faults.is_empty() {
-        axisymmetry::check(checks, file, &materials, colliders.as_deref().unwrap_or(&[]));
+        axisymmetry::check(checks, file, colliders.as_deref().unwrap_or(&[]));
     }
     let problem = Problem {
         name,

@@ -8,6 +8,7 @@ use crate::job::parse::source::Path;
 use crate::job::problem::{Body, CELLS_PER_LEAF, TreeSetup};
 use crate::job::schema::common::FASTEST;
 use crate::job::schema::job_file::{self as file, JobFile, Source as WrittenSource};
+use crate::kernel::Coordinates;
 use crate::material::parameters::Parameters;
 use crate::quantity::{FACES, Quantity};
 use crate::source::{Source, particles_in};
@@ -23,6 +24,7 @@ pub(super) struct Context<'a, const D: usize> {
     pub space: &'a Space<D>,
     pub tree: &'a TreeSetup<D>,
     pub root_edge: f64,
+    pub coordinates: Coordinates,
 }
 
 /// All sources with their bodies, or faults.
@@ -49,7 +51,7 @@ fn source<const D: usize>(
     context: &Context<'_, D>,
     path: &Path,
 ) -> Option<(Source<D>, Body<D>)> {
-    let Context { file, space, tree, root_edge } = *context;
+    let Context { file, space, tree, root_edge, coordinates } = *context;
     if let Some(until) = written.until.filter(|until| *until <= written.from) {
         let message =
             format!("found {} s; expected a time after from = {} s", number(until), number(written.from));
@@ -130,9 +132,14 @@ fn source<const D: usize>(
         );
         checks.fault(&path.key("velocity"), message);
     }
-    let mass = file.materials[body.material].density * spacing.powi(D as i32);
+    let density = file.materials[body.material].density;
+    let around: Vec<f64> = entries.iter().map(|entry| coordinates.around(entry[0])).collect();
+    let masses: Vec<f64> = around.iter().map(|around| density * spacing.powi(D as i32) * around).collect();
     let shortest = spacing / velocity[axis].abs();
-    let of_layer = mass * entries.len() as f64;
+    let of_layer = match coordinates {
+        Coordinates::Cartesian => masses[0] * entries.len() as f64,
+        Coordinates::Axisymmetric => masses.iter().sum(),
+    };
     let most = of_layer / shortest;
     if let Some(rate) = written.rate.filter(|rate| *rate > most * (1.0 + 1e-9)) {
         let message = format!(
@@ -151,9 +158,14 @@ fn source<const D: usize>(
         material: body.material as u16,
         level,
         spacing,
-        mass,
+        masses,
+        halves: around.iter().map(|around| 0.5 * spacing * around.sqrt()).collect(),
         velocity,
-        total: particles_in(span, period, entries.len()),
+        total: match coordinates {
+            Coordinates::Cartesian => particles_in(span, period, entries.len()),
+            // Whole layers: particles of one have unlike masses.
+            Coordinates::Axisymmetric => particles_in(span, period, 1).saturating_mul(entries.len() as u64),
+        },
         entries,
         period,
         passage: (bounds.upper[axis] - bounds.lower[axis]) / velocity[axis].abs(),

@@ -7,6 +7,7 @@
 use crate::boundary::Collider;
 use crate::geometry::Aabb;
 use crate::geometry::surface::{Patch, Region, patches};
+use crate::kernel::Coordinates;
 use crate::load::{Load, Water};
 use crate::quantity::in_job;
 use crate::solver::state::Solver;
@@ -22,6 +23,7 @@ pub struct Thrust<const D: usize> {
     colliders: Vec<Vec<Patch<D>>>,
     /// Edges of the domain, m.
     extent: [f64; D],
+    coordinates: Coordinates,
 }
 
 /// Water at a time.
@@ -42,9 +44,14 @@ impl<const D: usize> Acting<'_, D> {
 
 impl<const D: usize> Thrust<D> {
     /// Surfaces of colliders in a domain with these edges (m), made of roots of this edge, m.
-    pub fn new(colliders: &[Collider<D>], extent: [f64; D], root_edge: f64) -> Self {
+    pub fn new(
+        colliders: &[Collider<D>],
+        extent: [f64; D],
+        root_edge: f64,
+        coordinates: Coordinates,
+    ) -> Self {
         let pieces = colliders.iter().map(|collider| surface(collider, &extent, root_edge));
-        Self { colliders: pieces.collect(), extent }
+        Self { colliders: pieces.collect(), extent, coordinates }
     }
 
     /// Not collective. Force of the water on each collider, N; in plane strain per metre of thickness.
@@ -57,7 +64,8 @@ impl<const D: usize> Thrust<D> {
             for piece in pieces {
                 let x = collider.to_space(&piece.centre, &state.pose);
                 if (0..D).all(|a| (0.0..=self.extent[a]).contains(&x[a])) {
-                    let (pressure, area) = (acting.pressure(&x), collider.turned(&piece.area, &state.pose));
+                    let area = collider.turned(&piece.area, &state.pose);
+                    let pressure = acting.pressure(&x) * self.coordinates.around(x[0]);
                     (0..D).for_each(|a| force[a] -= pressure * area[a]);
                 }
             }
@@ -87,7 +95,8 @@ impl<const D: usize> Thrust<D> {
                         rest /= points;
                     }
                     let is_bare = present.iter().all(|(c, state)| c.distance(&x, &state.pose) > 0.0);
-                    sum += if is_bare { acting.pressure(&x) } else { 0.0 };
+                    let around = self.coordinates.around(x[0]);
+                    sum += if is_bare { acting.pressure(&x) * around } else { 0.0 };
                 }
                 forces.push(sign * sum * area);
             }

@@ -3,7 +3,7 @@ use rayon::prelude::*;
 
 use crate::grid::GridPlan;
 use crate::grid::leaf_geometry::{LeafCells, leaf_box};
-use crate::kernel::{ARENA_EDGE, BLOCK};
+use crate::kernel::{ARENA_EDGE, BLOCK, Coordinates};
 use crate::load::Seepage;
 use crate::particle::chunk::{Chunk, Tag};
 use crate::particle::volume::volume;
@@ -35,6 +35,7 @@ pub(super) struct GroundLeaf<const D: usize> {
     pub(super) permeability: Vec<f64>,
     /// Part of it that conducts, by the share of the cell below the free surface.
     pub(super) wet: Vec<f64>,
+    pub(super) coordinates: Coordinates,
 }
 
 /// Distance of the nodes of an arena along an axis.
@@ -54,9 +55,14 @@ pub(super) fn to_corner<const D: usize>(corner: usize) -> usize {
 
 impl<const D: usize> Ground<D> {
     /// Not collective. That of the particles of own leaves.
-    pub(super) fn of(plan: &GridPlan<D>, seepage: &Seepage<D>, chunks: &[Chunk<D>]) -> Self {
+    pub(super) fn of(
+        plan: &GridPlan<D>,
+        seepage: &Seepage<D>,
+        chunks: &[Chunk<D>],
+        coordinates: Coordinates,
+    ) -> Self {
         let filled = chunks.par_iter().enumerate().filter(|(_, chunk)| !chunk.is_empty());
-        let leaves = filled.map(|(leaf, chunk)| GroundLeaf::of(plan, seepage, leaf, chunk));
+        let leaves = filled.map(|(leaf, chunk)| GroundLeaf::of(plan, seepage, leaf, chunk, coordinates));
         let leaves: Vec<GroundLeaf<D>> = leaves.collect();
         let mut number = vec![u32::MAX; chunks.len()];
         (0..).zip(&leaves).for_each(|(n, leaf)| number[leaf.leaf] = n);
@@ -65,7 +71,13 @@ impl<const D: usize> Ground<D> {
 }
 
 impl<const D: usize> GroundLeaf<D> {
-    fn of(plan: &GridPlan<D>, seepage: &Seepage<D>, leaf: usize, chunk: &Chunk<D>) -> Self {
+    fn of(
+        plan: &GridPlan<D>,
+        seepage: &Seepage<D>,
+        leaf: usize,
+        chunk: &Chunk<D>,
+        coordinates: Coordinates,
+    ) -> Self {
         let octant = &plan.tree.leaves()[plan.tree.first_own() + leaf];
         let bins = plan.leaf_bins(leaf);
         // Every leaf has a bin of its own level.
@@ -80,15 +92,19 @@ impl<const D: usize> GroundLeaf<D> {
             *products = volume.mul_add(seepage.permeabilities[material], *products);
         }
         let whole = FULL * cell.powi(D as i32);
-        let permeability =
-            |&[volume, product]: &[f64; 2]| if volume > 0.0 { product / volume.max(whole) } else { 0.0 };
+        let permeability = |(number, &[volume, product]): (usize, &[f64; 2])| {
+            let middle = ((number % BLOCK) as f64 + 0.5).mul_add(cell, corners.0[0]);
+            let whole = whole * coordinates.around(middle);
+            if volume > 0.0 { product / volume.max(whole) } else { 0.0 }
+        };
         Self {
             leaf,
             bin,
             corner: corners.0,
             cell,
             wet: vec![1.0; sums.len()],
-            permeability: sums.iter().map(permeability).collect(),
+            permeability: sums.iter().enumerate().map(permeability).collect(),
+            coordinates,
         }
     }
 
@@ -98,7 +114,9 @@ impl<const D: usize> GroundLeaf<D> {
     }
 
     /// Calls `each` with the two nodes of each edge of a cell with ground, the lower first, and what it
-    /// conducts, m²/s (in plane strain m/s): the quadrature at the corners of the interpolation in the cell.
+    /// conducts, m²/s (in plane strain m/s): the quadrature at the corners of the interpolation in the cell. Of
+    /// rings an edge along the axis conducts for the half of the cell next to it, one along the radius over the
+    /// circumference at its middle.
     pub(super) fn for_each_edge(&self, mut each: impl FnMut(usize, usize, f64)) {
         let area = self.cell.powi(D as i32 - 2) / f64::from(1u32 << (D - 1));
         for cell in self.cells() {
@@ -106,7 +124,9 @@ impl<const D: usize> GroundLeaf<D> {
             for axis in 0..D {
                 for corner in (0..1usize << D).filter(|corner| corner >> axis & 1 == 0) {
                     let low = first + to_corner::<D>(corner);
-                    each(low, low + stride(axis), conducts);
+                    let middle = if axis == 0 { 0.5 } else { 0.25 + 0.5 * f64::from(corner as u32 & 1) };
+                    let radius = ((cell % BLOCK) as f64 + middle).mul_add(self.cell, self.corner[0]);
+                    each(low, low + stride(axis), conducts * self.coordinates.around(radius));
                 }
             }
         }
@@ -165,6 +185,7 @@ mod tests {
             cell: 0.25,
             permeability: vec![2.0; cells],
             wet: vec![1.0; cells],
+            coordinates: Coordinates::Cartesian,
         }
     }
 

@@ -14,6 +14,7 @@ use super::nodes::Nodes;
 use crate::exact_sum::ExactSum;
 use crate::grid::mask::{bits, block_nodes};
 use crate::grid::sums::volumes::{NodeVolumes, OfBlock};
+use crate::kernel::Coordinates;
 use crate::load::{Seepage, Up};
 
 /// Rounds until the free surface counts as not found.
@@ -72,11 +73,12 @@ impl Heads {
         held: &Held<'_, D>,
         is_covered: impl Fn(&[f64; D]) -> bool,
     ) -> Self {
-        let (plan, volumes) = (nodes.plan, NodeVolumes::new(nodes.plan));
+        let (plan, volumes) = (nodes.plan, NodeVolumes::new(nodes.plan, Coordinates::Cartesian));
         let (extent, axis) = (plan.extent(), held.up.axis);
         let finest = plan.tree.own_leaves().map(|leaf| plan.tree.leaves()[leaf].level).max().unwrap_or(0);
         let cell = nodes.comm.min_f64(plan.cell(finest));
-        // The volume of the cells with ground at each node.
+        // The volume of the cells with ground at each node; of rings that of their sections, which says as well
+        // whether it is all.
         let rows = nodes.sum(ground, |leaf, rows| {
             let share = (0.5 * leaf.cell).powi(D as i32);
             for cell in leaf.cells() {

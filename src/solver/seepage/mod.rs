@@ -2,7 +2,7 @@
 //!
 //! Darcy's flow `-k ∇h` conserves its volume. Each cell with material conducts as its permeability, and the
 //! interpolation in it is that of the tree: constrained nodes take the heads of their parents and hand their
-//! flows to these. Nothing is gathered; a solution takes an exchange of sums and three small reductions for each
+//! flows to these. Rings conduct over their circumference. Nothing is gathered; a solution takes an exchange of sums and three small reductions for each
 //! step of conjugate gradients. Particles carry the head about them as a linear function, with which they move,
 //! split and go to other ranks, until heads are found anew.
 //!
@@ -43,7 +43,7 @@ impl<const D: usize> Solver<D> {
             |x: &[f64; D]| covers.iter().any(|(collider, state)| collider.distance(x, &state.pose) <= 0.0);
         phases.time(Phase::Nodes, || {
             let Grid { plan, exchange, received, seam, .. } = grid;
-            let mut ground = Ground::of(plan, seepage, chunks);
+            let mut ground = Ground::of(plan, seepage, chunks, physics.coordinates);
             let mut nodes = Nodes::new(comm, plan, (exchange, received), seam, &ground);
             let mut heads = Heads::new(&mut nodes, &ground, &held, is_covered);
             let all = heads.held(comm, count);

@@ -2,6 +2,7 @@
 use crate::grid::GridPlan;
 use crate::grid::mask::block_nodes;
 use crate::grid::sums::volumes::NodeVolumes;
+use crate::kernel::Coordinates;
 use crate::memory::Block;
 
 /// Shares of the basis functions of the nodes of a block that lie outside colliders, less than 0 by depth, in
@@ -26,10 +27,10 @@ pub(in crate::solver) struct NodeFill {
 }
 
 impl NodeFill {
-    pub(in crate::solver) fn new<const D: usize>(plan: &GridPlan<D>) -> Self {
+    pub(in crate::solver) fn new<const D: usize>(plan: &GridPlan<D>, coordinates: Coordinates) -> Self {
         Self {
             of_nodes: Block::zeroed(plan.blocks.len() * block_nodes(D)),
-            volumes: NodeVolumes::new(plan),
+            volumes: NodeVolumes::new(plan, coordinates),
             dirty: vec![false; plan.blocks.len()],
             open: vec![None; plan.blocks.len()],
             scattered: Vec::new(),

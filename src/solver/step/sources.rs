@@ -5,6 +5,7 @@
 //! kinetic energy that this requires are added to those of the particles that enter.
 use crate::geometry::{Aabb, Side};
 use crate::grid::leaf_geometry::position_key;
+use crate::kernel::Coordinates;
 use crate::particle::chunk::{Chunk, Layout, Tag};
 use crate::solver::physics::Physics;
 use crate::solver::state::Solver;
@@ -125,15 +126,16 @@ impl<const D: usize> Solver<D> {
             let mut columns = vec![0.0_f64; Layout::<D>::REALS];
             (0..3).for_each(|diagonal| columns[Layout::<D>::LEFT_CAUCHY_GREEN + diagonal] = 1.0);
             columns[Layout::<D>::VELOCITY..][..D].copy_from_slice(&source.velocity);
-            columns[Layout::<D>::MASS] = source.mass;
-            columns[Layout::<D>::HALF] = 0.5 * source.spacing;
             let material = &physics.materials[usize::from(source.material)];
             columns[Layout::<D>::STRESS..][..3].fill(-material.rest_pressure());
             let history = material.initial_history();
             columns[Layout::<D>::HISTORY..][..history.len()].copy_from_slice(&history);
             let tag = Tag { material: source.material, body: source.body, level: source.level }.pack();
             for layer in layers {
-                for x in source.layer(layer, to) {
+                for (line, x) in source.layer(layer, to) {
+                    let mass = source.masses[line];
+                    columns[Layout::<D>::MASS] = mass;
+                    columns[Layout::<D>::HALF] = source.halves[line];
                     let id = ledger.next_root;
                     ledger.next_root += 1;
                     // A shape at a face of the domain may end within the displacement of a step.
@@ -143,17 +145,18 @@ impl<const D: usize> Solver<D> {
                     let Some(leaf) = known.and_then(|known| tree.local(known)) else { continue };
                     let chunk = &mut chunks[leaf];
                     sums.fed[number][0] += 1;
-                    sums.fed[number][1] += u64::from(is_taken(chunk, &x, 0.5 * source.spacing));
+                    sums.fed[number][1] +=
+                        u64::from(is_taken(chunk, &x, 0.5 * source.spacing, physics.coordinates));
                     columns[Layout::<D>::POSITION..][..D].copy_from_slice(&x);
                     let words: Vec<u64> = columns.iter().map(|value| value.to_bits()).collect();
                     chunk.push_words(&words, id, tag, &[]);
                     let signal = &mut leaf_data.signal[leaf];
                     *signal = signal.max(physics.signal_of(source, plan.finest_cell(leaf)));
-                    fluxes.book_fed(&x, source.mass);
+                    fluxes.book_fed(&x, mass);
                     let sums = &mut sums.sources.of[number];
-                    sums[0].add(source.mass);
-                    (0..D).for_each(|a| sums[1 + a].add(source.mass * source.velocity[a]));
-                    sums[4].add(0.5 * source.mass * square(&source.velocity));
+                    sums[0].add(mass);
+                    (0..D).for_each(|a| sums[1 + a].add(mass * source.velocity[a]));
+                    sums[4].add(0.5 * mass * square(&source.velocity));
                 }
             }
         }
@@ -170,10 +173,11 @@ impl<const D: usize> Solver<D> {
 
 /// Whether half of the box of an entering particle, along each axis, lies in the box of a particle of the
 /// chunk.
-fn is_taken<const D: usize>(chunk: &Chunk<D>, x: &[f64; D], half: f64) -> bool {
+fn is_taken<const D: usize>(chunk: &Chunk<D>, x: &[f64; D], half: f64, coordinates: Coordinates) -> bool {
     let halves = chunk.column(Layout::<D>::HALF);
     (0..chunk.len()).any(|q| {
-        let (y, near) = (chunk.position(q), 0.5 * (half + halves[q]));
+        let y = chunk.position(q);
+        let near = 0.5 * (half + coordinates.half_width(halves[q], y[0]));
         (0..D).all(|a| (x[a] - y[a]).abs() < near)
     })
 }

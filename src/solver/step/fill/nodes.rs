@@ -47,8 +47,8 @@ impl<const D: usize> Solver<D> {
     }
 
     fn node_fill(&mut self) -> &mut NodeFill {
-        let grid = &mut self.grid;
-        grid.fill.get_or_insert_with(|| Box::new(NodeFill::new(&grid.plan)))
+        let (grid, coordinates) = (&mut self.grid, self.physics.coordinates);
+        grid.fill.get_or_insert_with(|| Box::new(NodeFill::new(&grid.plan, coordinates)))
     }
 
     /// Not collective. Finds how full the nodes are that G2P reads, in jobs with fluids: real ones from their
