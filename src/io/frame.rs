@@ -100,7 +100,13 @@ impl Frame {
         }
         self.positions = copies.iter().map(|&(p, turn)| turn.place(self.positions[p])).collect();
         self.half_widths = copies.iter().map(|&(p, _)| self.half_widths[p]).collect();
-        self.header.dimension = 3;
+        // The domain of the whole body: the radius to both sides of the axis, along x and y.
+        let header = &mut self.header;
+        let [radius, height] = [0, 1].map(|axis| header.roots.get(axis).copied().unwrap_or(1));
+        let bottom = header.origin.get(1).copied().unwrap_or(0.0);
+        let side = -(radius as f64) * header.root_edge;
+        (header.origin, header.roots) = (vec![side, side, bottom], vec![2 * radius, 2 * radius, height]);
+        header.dimension = 3;
         Ok(self)
     }
 

@@ -19,6 +19,7 @@ use base64::engine::general_purpose::STANDARD as BASE64;
 
 use crate::io::frame::{Frame, Leaves, shown_in};
 use crate::io::hdf5_file::FileError;
+use crate::io::snapshot::PointField;
 
 mod columns;
 mod meta;
@@ -74,7 +75,7 @@ fn fill(
     let wanted = columns::sources(&columns);
     let mut survey = LeafMaxima::new(columns.len());
     for path in files {
-        survey.look(path, &Frame::read(path, &wanted, true)?, &columns)?;
+        survey.look(path, &shown(path, &wanted, options)?, &columns)?;
     }
     let scales = survey.scales(&columns, options.bits);
 
@@ -91,9 +92,10 @@ fn fill(
     let mut frames = Vec::new();
     let mut tree: Option<(usize, Leaves)> = None;
     for (number, path) in files.iter().enumerate() {
-        let frame = Frame::read(path, &wanted, true)?;
+        let frame = shown(path, &wanted, options)?;
         page(&data(&format!("frame-{number}"), &pack::particles(&frame, &columns, &scales, &survey)))?;
-        let leaves = Leaves::of_output(path)?;
+        // A tree of sections has no place among bodies in space.
+        let leaves = if options.revolve.is_some() { Leaves::default() } else { Leaves::of_output(path)? };
         // A tree that does not change is kept once.
         if tree.as_ref().is_none_or(|(_, known)| *known != leaves) {
             page(&data(&format!("tree-{number}"), &pack::leaves(&leaves)))?;
@@ -111,6 +113,17 @@ fn fill(
     page(after)?;
     let file = file.into_inner().map_err(|error| failed(error.into_error()))?;
     file.metadata().map(|data| data.len()).map_err(failed)
+}
+
+/// The particles of a file, in space if the page shows them so.
+fn shown(path: &Path, wanted: &[PointField], options: &Options) -> Result<Frame, FileError> {
+    let frame = Frame::read(path, wanted, true)?;
+    match options.revolve {
+        Some(revolve) => {
+            frame.revolved(revolve).map_err(|reason| FileError::Refused { path: path.into(), reason })
+        }
+        None => Ok(frame),
+    }
 }
 
 /// Compressed numbers as an element of the page that no browser runs or shows.

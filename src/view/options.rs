@@ -1,4 +1,5 @@
 //! Options of a view.
+use crate::io::revolve::Revolve;
 use crate::io::snapshot::PointField;
 
 /// Options of a view.
@@ -10,4 +11,6 @@ pub struct Options {
     pub fields: Option<Vec<PointField>>,
     /// Bits for a real value, 4 to 16.
     pub bits: u8,
+    /// Bodies of revolution in space; then without the tree.
+    pub revolve: Option<Revolve>,
 }

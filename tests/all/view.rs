@@ -183,6 +183,38 @@ fn page_is_one_file_that_names_no_other_and_no_markup_of_titles() {
     assert_eq!(meta["title"], "a </script><b> & \"c\"");
 }
 
+/// Bodies of revolution come to be all around the axis, z; those of other jobs are refused.
+#[test]
+fn bodies_of_revolution_are_shown_in_space() {
+    let job = "version = 1\ndimension = 2\ngeometry = 'axisymmetric'\n[domain]\nsize = [1, 1]\nroot_edge = 0.5\n\
+        [[bodies]]\nname = 'disk'\nmaterial = 'rubber'\nvelocity = [0, 1]\n\
+        shape = { kind = 'box', min = [0, 0.25], max = [0.5, 0.5] }\n\
+        [time]\nend = 0.01\n[output]\npicture = false\n";
+    let words = |name: &str| {
+        ["view".to_owned(), format!("out/{name}/{name}.hdf.series"), "--revolve=whole".to_owned()]
+    };
+    let view = |directory: &Path, name: &str| {
+        let words = words(name);
+        let words: Vec<&str> = words.iter().map(String::as_str).chain(["--out", "page.html"]).collect();
+        agimp(directory, &words)
+    };
+    let directory = finished("disk", &[job, RUBBER_MATERIAL].concat(), &[]);
+    let output = view(directory.path(), "disk");
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let page = std::fs::read_to_string(directory.path().join("page.html")).expect("the page");
+    let meta: Value = serde_json::from_str(element(&page, "meta")).expect("JSON");
+    assert_eq!(meta["dimension"], 3);
+    assert_eq!(meta["frames"][0]["leaves"], 0);
+    for (axis, [low, high]) in [[-0.5, 0.5], [-0.5, 0.5], [0.25, 0.51]].into_iter().enumerate() {
+        let bounds = [0, 1].map(|side: usize| real(&meta["bounds"][side][axis]));
+        assert!((bounds[0] - low).abs() < 0.05 && (bounds[1] - high).abs() < 0.05, "{axis}: {bounds:?}");
+    }
+    let plane = run();
+    let output = view(plane.path(), "half");
+    let words = String::from_utf8_lossy(&output.stderr);
+    assert!(!output.status.success() && words.contains("found no bodies of revolution"), "{words}");
+}
+
 #[test]
 fn what_cannot_be_shown_is_refused_and_writes_nothing() {
     let directory = run();

@@ -2,6 +2,7 @@
 use super::given::Given;
 use crate::cli::Failure;
 use crate::cli::shared::looks;
+use crate::io::revolve::Revolve;
 use crate::io::snapshot::PointField;
 use crate::text::bytes;
 use crate::view::{self, Options};
@@ -22,6 +23,11 @@ pub struct Arguments {
     /// Bits for each real value; more bits give finer values and a larger page.
     #[arg(long, default_value_t = 10, value_parser = clap::value_parser!(u8).range(4..=16))]
     bits: u8,
+    /// Bodies of revolution in space (jobs with geometry = "axisymmetric"), with the quarter towards the viewer
+    /// cut out, or whole; without the tree.
+    #[arg(long, value_name = "open|whole", num_args = 0..=1, require_equals = true, default_missing_value = "open",
+        value_parser = str::parse::<Revolve>)]
+    revolve: Option<Revolve>,
     /// Title; by default the title of the job that wrote the first file, or the name of the page.
     #[arg(long)]
     title: Option<String>,
@@ -40,7 +46,8 @@ pub(in crate::cli) fn execute(arguments: &Arguments) -> Result<(), Failure> {
     let out = arguments.out.clone().unwrap_or_else(|| super::beside(&first, "html"));
     let name = out.file_stem().unwrap_or_default().to_string_lossy();
     let title = looks::title(arguments.title.as_deref(), files.first().map(PathBuf::as_path), &name);
-    let options = Options { title, fields: arguments.fields.clone(), bits: arguments.bits };
+    let (fields, bits, revolve) = (arguments.fields.clone(), arguments.bits, arguments.revolve);
+    let options = Options { title, fields, bits, revolve };
     let size = view::write(&files, &options, &out).map_err(failed)?;
     let times = if files.len() == 1 { "one time".into() } else { format!("{} times", files.len()) };
     writeln!(std::io::stdout(), "{} ({times}, {}; open in a browser)", out.display(), bytes(size as f64))?;
