@@ -256,3 +256,50 @@ fn newton_converges_quadratically() {
         assert!(steps[3][0] <= steps[0][0] + 2.0, "{law}: {steps:?}");
     }
 }
+
+/// Pressure over strength in a cylindrical cavity of first radius 1 that has grown to a, in incompressible Tresca clay with
+/// G/s = 50 and a free outer wall at first at b: `∫ (σ_θ - σ_r)/s dr/r`, the difference being 4 G ln(r/R), at most 2 s.
+fn cavity_pressure(a: f64, b: f64) -> f64 {
+    let grown = a * a - 1.0;
+    let (pieces, from, to) = (20_000, a.ln(), 0.5 * (b * b + grown).ln());
+    let piece = (to - from) / f64::from(pieces);
+    let difference = |i: i32| {
+        let r = ((f64::from(i) + 0.5) * piece + from).exp();
+        (200.0 * (r / (r * r - grown).sqrt()).ln()).min(2.0)
+    };
+    (0..pieces).map(|i| difference(i) * piece).sum()
+}
+
+/// The cavity of the job, which grows to 1.69 of its first radius: its pressure is that of the closed form for clay with a free outer wall at all
+/// radii. In infinite clay that form is an independent table.
+#[test]
+fn a_cavity_in_clay_has_the_pressure_of_the_closed_form() {
+    // G/s = 50: p/s at a/a0.
+    let table = [
+        (1.01, 0.9900935774),
+        (1.1, 3.165749342),
+        (1.5, 4.329230785),
+        (2.0, 4.629335377),
+        (5.0, 4.876195455),
+    ];
+    for (a, exact) in table {
+        let found = cavity_pressure(a, 1e5);
+        assert!((found / exact - 1.0).abs() < 1e-6, "{found} for {exact}");
+    }
+    let path =
+        std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("jobs/cavity_expansion_axisymmetric.toml");
+    let found = History::of_job("cavity", &std::fs::read_to_string(path).expect("job"), &[]);
+    let (places, forces) = (found.column("centre_wall_x"), found.column("load_cavity_x"));
+    let rows = places.iter().zip(forces).skip(1).map(|(r, force)| {
+        let a = (r * r - places[0] * places[0] + 1.0).sqrt();
+        let pressure = force / (std::f64::consts::TAU * a * 2.0) / 20e3;
+        (a, pressure, pressure / cavity_pressure(a, 40.0) - 1.0)
+    });
+    let rows: Vec<(f64, f64, f64)> = rows.collect();
+    for (a, pressure, off) in rows.iter().step_by(4) {
+        println!("a {a:.4}: {pressure:.4} s, off by {:+.2} %", 100.0 * off);
+    }
+    let last = rows[rows.len() - 1];
+    assert!(last.0 > 1.6, "{last:?}");
+    assert!(rows.iter().all(|(_, _, off)| off.abs() < 0.005), "{rows:?}");
+}
