@@ -39,6 +39,7 @@ mod quasi_static;
 mod report;
 mod rigid_contact;
 mod rings;
+mod rings_manufactured;
 mod rings_of_water;
 mod seepage;
 mod shocks;
@@ -69,6 +70,7 @@ fn worker() {
         golden::SCENARIOS,
         rings::SCENARIOS,
         walls_and_origin::SCENARIOS,
+        rings_manufactured::SCENARIOS,
         weights_axisymmetric::SCENARIOS,
         weights_exact::SCENARIOS,
         weights_properties::SCENARIOS,
