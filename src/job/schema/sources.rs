@@ -32,7 +32,7 @@ pub struct Source {
     #[schemars(range(min = 0.0, max = 1e12))]
     pub from: f64,
     /// Time until which it feeds, s; to the end by default. The mass fed is rate times time to half a
-    /// particle.
+    /// particle, of bodies of revolution to half a layer.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(range(max = 1e12), extend("exclusiveMinimum" = 0.0))]
     pub until: Option<f64>,
