@@ -46,7 +46,6 @@ pub(super) fn check<const D: usize>(checks: &mut Checks, file: &JobFile, problem
     }
     refuse(!file.sources.is_empty(), root.key("sources"), "sources", "bodies");
     refuse(!file.contact.is_empty(), root.key("contact"), "contact between bodies", "bodies that stick");
-    refuse(file.water.is_some(), root.key("water"), "water in the pores", none);
     let numerics = root.key("numerics");
     let is_affine = matches!(problem.transfer, Transfer::Apic | Transfer::Tpic);
     refuse(!is_affine, numerics.key("transfer"), "a transfer by increments", "\"apic\" or \"tpic\"");

@@ -65,9 +65,10 @@ impl<const D: usize> Solver<D> {
             return (dt, sorted.map(|()| Moved::default()).map_err(Into::into));
         }
         let (mut dt, mut cuts) = (dt, 0);
-        let masses = columns(&self.chunks, Layout::<D>::MASS);
         let hoops = columns(&self.chunks, Layout::<D>::STRESS + 2);
         loop {
+            self.wet_particles(self.clock.time + dt);
+            let masses = columns(&self.chunks, Layout::<D>::MASS);
             self.physics.weaken(self.clock.time + dt);
             let rates = self.collider_rates(dt);
             let (unknowns, outer, pulls) = self.outer_forces(&rates, dt);
@@ -100,6 +101,7 @@ impl<const D: usize> Solver<D> {
                         if reduction.is_bracket(2.0 * dt) {
                             self.equilibrium.next_load_step = dt;
                             self.physics.weaken(self.clock.time);
+                            self.wet_particles(self.clock.time);
                             restore(&mut self.chunks, Layout::<D>::STRESS + 2, &hoops);
                             self.chunks.iter_mut().for_each(stop);
                             return (0.0, Ok(Moved::default()));
@@ -240,6 +242,7 @@ impl<const D: usize> Solver<D> {
         self.book_pushes(Lengths { kick: dt, drift: dt });
         self.chunks.iter_mut().for_each(stop);
         let moved = self.migrate_particles(departed);
+        self.wet_particles(to);
         self.chunks.iter_mut().for_each(stop);
         let pushes = vec![Default::default(); rates.len()];
         self.move_colliders(rates, &pushes, impulses, to, dt);
