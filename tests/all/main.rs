@@ -26,6 +26,7 @@ mod hostile_files;
 mod initial_stress;
 mod io_files;
 mod load_step_tables;
+mod load_step_walls;
 mod load_step_water;
 mod loads;
 mod materials;

@@ -70,15 +70,9 @@ pub(super) fn check<const D: usize>(checks: &mut Checks, file: &JobFile, problem
     for (i, collider) in problem.colliders.iter().enumerate() {
         let here = root.key("colliders").index(i);
         refuse(collider.free().is_some(), here.key("motion"), "a free body", "a prescribed motion");
-        let is_sticky = collider.contact == Contact::Sticky;
+        refuse(has_shear(collider.contact), here.key("contact"), "friction, cohesion or drag", "none");
         refuse(
-            !is_sticky,
-            here.key("contact"),
-            "a collider that material may leave or slip along",
-            "\"sticky\"",
-        );
-        refuse(
-            is_sticky && !collider.acts_on_nodes(),
+            !collider.acts_on_nodes(),
             here.key("acts_on"),
             "a collider that acts on particles",
             "\"nodes\"",
@@ -94,9 +88,7 @@ pub(super) fn check<const D: usize>(checks: &mut Checks, file: &JobFile, problem
                 let is_named = number > 0 || problem.named_faces[axis][side];
                 let here = path.key("boundaries").key(FACES[axis][side]);
                 let (found, expected) = match faces[axis][side] {
-                    Some(Contact::Separating { .. }) => {
-                        ("a face that only bears pressure", "sticky, slip or symmetric")
-                    }
+                    Some(contact) if has_shear(contact) => ("friction, cohesion or drag", "none"),
                     Some(Contact::Absorbing) => ("a face that absorbs waves", "another kind"),
                     _ => continue,
                 };
@@ -104,4 +96,9 @@ pub(super) fn check<const D: usize>(checks: &mut Checks, file: &JobFile, problem
             }
         }
     }
+}
+
+/// Whether a surface brakes what slides along it.
+fn has_shear(contact: Contact) -> bool {
+    contact.acts_by_area() || matches!(contact, Contact::Separating { friction, .. } if friction > 0.0)
 }

@@ -1,4 +1,6 @@
 //! Nodes of all ranks: the unknowns with their numbers, and what hanging and tied nodes follow.
+use std::collections::BTreeMap;
+
 use partition::comm::Comm;
 use rustc_hash::FxHashMap;
 
@@ -6,8 +8,12 @@ use super::lattice::Lattice;
 use super::unknowns::Unknowns;
 use crate::grid::constraints::parents::parents_of;
 
-/// An unknown that a corner of a cell follows: number, axes on which it does not, a bit each, and weight.
-pub(super) type Share = (u32, u8, f64);
+/// An unknown that a corner of a cell follows: number, axes on which it does not, a bit each, weight, and the
+/// number of the map of its displacement, 0 for none.
+pub(super) type Share = (u32, u8, f64, u32);
+
+/// A map of displacements.
+pub(super) type Map<const D: usize> = [[f64; D]; D];
 
 /// Values of all ranks in the order of the ranks, on every rank.
 pub(super) fn all_of<T: bytemuck::Pod>(comm: &Comm, own: &[T]) -> Vec<T> {
@@ -25,11 +31,18 @@ pub(super) fn whole_unit(greatest: f64) -> f64 {
 
 /// Nodes of all ranks.
 pub(super) struct Everywhere<const D: usize> {
-    /// Of each tied node, the unknowns that it follows, by place, with axes on which they do not follow.
-    tied: FxHashMap<Lattice<D>, Vec<(Lattice<D>, u8, f64)>>,
+    /// Of each tied node, the unknowns that it follows, by place, with axes on which they do not follow, and
+    /// maps.
+    tied: FxHashMap<Lattice<D>, Vec<(Lattice<D>, u8, f64, u32)>>,
     /// Places of the unknowns with what is held, in the order of their numbers.
     pub(super) free: Vec<(Lattice<D>, u8)>,
     pub(super) numbers: FxHashMap<Lattice<D>, u32>,
+    /// Conditions on unknowns that are not along axes, by number: unit vectors.
+    pub(super) turned: Vec<(u32, [f64; D])>,
+    /// Maps of displacements; the first stands for none.
+    pub(super) maps: Vec<Map<D>>,
+    /// Maps of unknowns with such conditions.
+    of_free: FxHashMap<u32, u32>,
 }
 
 impl<const D: usize> Everywhere<D> {
@@ -54,7 +67,18 @@ impl<const D: usize> Everywhere<D> {
         let mut axes: [usize; D] = std::array::from_fn(|a| a);
         axes.sort_by_key(|&a| -extent(a));
         free.sort_unstable_by_key(|(place, _)| axes.map(|a| place[a]));
-        let numbers = free.iter().zip(0..).map(|((place, _), number)| (*place, number)).collect();
+        let numbers: FxHashMap<Lattice<D>, u32> =
+            free.iter().zip(0..).map(|((place, _), number)| (*place, number)).collect();
+        let projections = projections(comm, unknowns);
+        let (mut maps, mut of_free) = (vec![[[0.0; D]; D]], FxHashMap::default());
+        let mut turned = Vec::new();
+        for (place, (all, map)) in &projections {
+            if let Some(&number) = numbers.get(place) {
+                turned.extend(all.iter().map(|along| (number, *along)));
+                of_free.insert(number, maps.len() as u32);
+                maps.push(*map);
+            }
+        }
         let ties = unknowns.ties().iter().filter(|(node, _)| unknowns.owned[*node]);
         let words: Vec<i64> = ties
             .flat_map(|(node, corners)| corners.iter().map(|(corner, weight)| (*node, *corner, *weight)))
@@ -68,9 +92,26 @@ impl<const D: usize> Everywhere<D> {
             let [node, corner]: [Lattice<D>; 2] =
                 std::array::from_fn(|which| std::array::from_fn(|a| words[which * D + a]));
             let weight = f64::from_bits(words[2 * D + 1] as u64);
-            tied.entry(node).or_default().push((corner, words[2 * D] as u8, weight));
+            let mut held = words[2 * D] as u8;
+            let known = |place: &Lattice<D>| projections.get(place).map(|(_, map)| map);
+            let map = match (known(&node), known(&corner)) {
+                (None, None) => 0,
+                (own, of_corner) => {
+                    let free = |bits: u8| -> Map<D> {
+                        let diagonal = |a: usize| f64::from(1 - (bits >> a & 1));
+                        std::array::from_fn(|i| {
+                            std::array::from_fn(|k| if i == k { diagonal(i) } else { 0.0 })
+                        })
+                    };
+                    let own = own.map_or(free(held), |own| product(&free(held), own));
+                    held = 0;
+                    maps.push(of_corner.map_or(own, |of_corner| product(&own, of_corner)));
+                    maps.len() as u32 - 1
+                }
+            };
+            tied.entry(node).or_default().push((corner, held, weight, map));
         }
-        Self { tied, free, numbers }
+        Self { tied, free, numbers, turned, maps, of_free }
     }
 
     /// Adds what a node on the lattice of this edge follows.
@@ -83,12 +124,13 @@ impl<const D: usize> Everywhere<D> {
         out: &mut Vec<Share>,
     ) {
         if let Some(&number) = self.numbers.get(place) {
-            return out.push((number, self.free[number as usize].1, factor));
+            let map = self.of_free.get(&number).copied().unwrap_or(0);
+            return out.push((number, self.free[number as usize].1, factor, map));
         }
         if let Some(corners) = self.tied.get(place) {
-            let known = corners.iter().filter_map(|(corner, held, weight)| {
+            let known = corners.iter().filter_map(|(corner, held, weight, map)| {
                 let number = *self.numbers.get(corner)?;
-                Some((number, held | self.free[number as usize].1, factor * weight))
+                Some((number, held | self.free[number as usize].1, factor * weight, *map))
             });
             return out.extend(known);
         }
@@ -100,4 +142,40 @@ impl<const D: usize> Everywhere<D> {
             }
         }
     }
+}
+
+/// Unit vectors of the conditions on a node that are not along axes, and the projection that takes them out.
+type Projection<const D: usize> = (Vec<[f64; D]>, Map<D>);
+
+/// Collective. Those of the nodes of all ranks, by place.
+fn projections<const D: usize>(comm: &Comm, unknowns: &Unknowns<D>) -> BTreeMap<Lattice<D>, Projection<D>> {
+    let own = unknowns.turned.iter().filter(|(node, _)| unknowns.owned[*node]);
+    let words: Vec<i64> = own
+        .flat_map(|(node, turned)| turned.iter().map(|(along, _)| (*node, *along)))
+        .flat_map(|(node, along)| {
+            unknowns.lattice[node].0.into_iter().chain(along.map(|value| value.to_bits() as i64))
+        })
+        .collect();
+    let mut all: BTreeMap<Lattice<D>, Projection<D>> = BTreeMap::new();
+    for words in all_of(comm, &words).chunks_exact(2 * D) {
+        let along: [f64; D] = std::array::from_fn(|a| f64::from_bits(words[D + a] as u64));
+        let identity = || std::array::from_fn(|i| std::array::from_fn(|k| if i == k { 1.0 } else { 0.0 }));
+        let (known, map) =
+            all.entry(std::array::from_fn(|a| words[a])).or_insert_with(|| (Vec::new(), identity()));
+        known.push(along);
+        for (i, row) in map.iter_mut().enumerate() {
+            row.iter_mut().zip(&along).for_each(|(value, other)| *value -= along[i] * other);
+        }
+    }
+    all
+}
+
+fn product<const D: usize>(a: &Map<D>, b: &Map<D>) -> Map<D> {
+    std::array::from_fn(|i| std::array::from_fn(|k| (0..D).fold(0.0, |sum, m| a[i][m].mul_add(b[m][k], sum))))
+}
+
+/// `Aᵀ B C`.
+pub(super) fn between<const D: usize>(a: &Map<D>, b: &Map<D>, c: &Map<D>) -> Map<D> {
+    let transposed: Map<D> = std::array::from_fn(|i| std::array::from_fn(|k| a[k][i]));
+    product(&product(&transposed, b), c)
 }

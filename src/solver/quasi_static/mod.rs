@@ -8,6 +8,7 @@
 //! | file | what it holds |
 //! |---|---|
 //! | `unknowns` | nodes, what holds them, ties, products |
+//! | `walls` | where they slide, stick or leave |
 //! | `points` | stress and tangent of the particles |
 //! | `everywhere` | nodes of all ranks |
 //! | `lattice` | cells on the lattice of the finest nodes |
@@ -28,11 +29,12 @@ mod points;
 mod skyline;
 mod strength;
 mod unknowns;
+mod walls;
 
 use self::newton::MOST_WAY;
 use self::unknowns::{Holder, Nodal, Unknowns};
+use self::walls::{Wall, dot};
 use super::step::colliders::Touch;
-use crate::boundary::Contact;
 use crate::boundary::motion::Rate;
 use crate::exact_sum::ExactSum;
 use crate::kernel::Row;
@@ -71,18 +73,15 @@ impl<const D: usize> Solver<D> {
             let masses = columns(&self.chunks, Layout::<D>::MASS);
             self.physics.weaken(self.clock.time + dt);
             let rates = self.collider_rates(dt);
-            let (unknowns, outer, pulls) = self.outer_forces(&rates, dt);
-            if let Some(face) = self.open_face(&unknowns) {
-                return (dt, Err(StepError::Face { face }));
-            }
-            let found = self.balance_forces(&unknowns, &outer, dt, settings.tolerance);
+            let (mut unknowns, outer, pulls) = self.outer_forces(&rates, dt);
+            let found = self.balance_forces(&mut unknowns, &outer, dt, settings.tolerance);
             restore(&mut self.chunks, Layout::<D>::MASS, &masses);
             match found {
                 Ok(balance) => {
                     let effort = Effort { cuts, ..balance.effort };
                     self.equilibrium.effort = effort;
                     let bound = if cuts > 0 { dt } else { self.equilibrium.next_load_step };
-                    let is_fast = effort.newton <= FAST;
+                    let is_fast = effort.newton <= FAST + balance.rounds;
                     let grown = if is_fast { GROWTH * bound } else { bound };
                     // Nodes of a longer step than the next may move too far.
                     let far = self.comm.max_f64(unknowns.greatest_way(&balance.way));
@@ -109,11 +108,11 @@ impl<const D: usize> Solver<D> {
                     } else if dt < settings.least_step {
                         let Effort { newton, linear, residual, worst, .. } = effort;
                         let place = (0..D).map(|a| self.physics.origin[a] + worst[a]).collect();
-                        let to = self.clock.time + 2.0 * dt;
-                        return (
-                            dt,
-                            Err(StepError::NoBalance { to, dt: 2.0 * dt, newton, linear, residual, place }),
-                        );
+                        let (to, dt) = (self.clock.time + 2.0 * dt, 2.0 * dt);
+                        let [slides, sticks] = unknowns.slides().map(|has| self.comm.any(has));
+                        let slides = slides && !sticks;
+                        let failed = StepError::NoBalance { to, dt, newton, linear, residual, place, slides };
+                        return (0.5 * dt, Err(failed));
                     }
                 }
             }
@@ -156,22 +155,6 @@ impl<const D: usize> Solver<D> {
         (unknowns, outer, pulls)
     }
 
-    /// The first face of the domain that material has reached and that gives no support which a load step
-    /// knows, as a number; on any rank.
-    fn open_face(&self, unknowns: &Unknowns<D>) -> Option<usize> {
-        let mut found = f64::INFINITY;
-        for &node in &unknowns.nodes {
-            let on = self.grid.plan.faces_at(node as usize);
-            for face in (0..2 * D).filter(|face| on >> face & 1 == 1) {
-                if matches!(self.physics.faces[face / 2][face % 2], Contact::Separating { .. }) {
-                    found = found.min(face as f64);
-                }
-            }
-        }
-        let found = self.comm.min_f64(found);
-        found.is_finite().then_some(found as usize)
-    }
-
     /// Not collective. Adds the impulses of the step to the sums of loads, colliders and faces. Returns those
     /// on the colliders.
     fn book(
@@ -190,33 +173,43 @@ impl<const D: usize> Solver<D> {
                 sums[3].add(force[a] * way[number][a]);
             }
         }
+        let mut book = |by: Holder, number: usize, on_holder: [f64; D]| match by {
+            Holder::Grip(load) => {
+                let sums = &mut self.sums.loads.of[load];
+                for a in 0..D {
+                    sums[a].add(-on_holder[a]);
+                    sums[3].add(-on_holder[a] / dt * way[number][a]);
+                }
+            }
+            Holder::Collider(collider) => {
+                let position = unknowns.places[number];
+                let touch = Touch { collider, position, impulse: on_holder };
+                touch.book(&self.physics.colliders, &self.contacts.states, &mut impulses);
+            }
+            Holder::Face(face) => {
+                if let Some(sums) = self.sums.faces.of.get_mut(face) {
+                    sums.iter_mut().zip(on_holder).for_each(|(sum, value)| sum.add(value));
+                }
+            }
+        };
+        // The node gets the opposite of the force that is left.
         for (number, held) in unknowns.held.iter().enumerate().filter(|(number, _)| unknowns.owned[*number]) {
             let mut last = None;
             for held in held.iter().flatten().filter(|held| last.replace(held.by) != Some(held.by)) {
                 let is_by = |a: usize| unknowns.held[number][a].is_some_and(|other| other.by == held.by);
-                // The node gets the opposite of the force that is left.
-                let on_holder: [f64; D] =
-                    std::array::from_fn(|a| if is_by(a) { dt * rest[number][a] } else { 0.0 });
-                match held.by {
-                    Holder::Grip(load) => {
-                        let sums = &mut self.sums.loads.of[load];
-                        for a in 0..D {
-                            sums[a].add(-on_holder[a]);
-                            sums[3].add(-on_holder[a] / dt * way[number][a]);
-                        }
-                    }
-                    Holder::Collider(collider) => {
-                        let position = unknowns.places[number];
-                        let touch = Touch { collider, position, impulse: on_holder };
-                        touch.book(&self.physics.colliders, &self.contacts.states, &mut impulses);
-                    }
-                    Holder::Face(face) => {
-                        if let Some(sums) = self.sums.faces.of.get_mut(face) {
-                            sums.iter_mut().zip(on_holder).for_each(|(sum, value)| sum.add(value));
-                        }
-                    }
-                }
+                let on_holder = std::array::from_fn(|a| if is_by(a) { dt * rest[number][a] } else { 0.0 });
+                book(held.by, number, on_holder);
             }
+        }
+        for (number, turned) in unknowns.turned.iter().filter(|(number, _)| unknowns.owned[*number]) {
+            for (along, held) in turned {
+                let force = dt * dot(along, &rest[*number]);
+                book(held.by, *number, along.map(|along| force * along));
+            }
+        }
+        let slides = |wall: &&Wall<D>| unknowns.owned[wall.node] && wall.push != [0.0; D];
+        for wall in unknowns.walls.iter().filter(slides) {
+            book(wall.by, wall.node, wall.push.map(|force| -dt * force));
         }
         impulses
     }

@@ -16,7 +16,7 @@ use rustc_hash::FxHashMap;
 
 use super::blocks::{Blocks, Level, Weights, cycle, factors, without_held};
 use super::bricks::Bricks;
-use super::everywhere::{Everywhere, Share, whole_unit};
+use super::everywhere::{Everywhere, Map, Share, between, whole_unit};
 use super::lattice::{Lattice, Mesh};
 use super::points::Points;
 use super::skyline::Skyline;
@@ -42,6 +42,9 @@ pub(super) struct Multigrid<const D: usize> {
     bricks: Bricks<D>,
     /// By cell and corner, what each follows.
     corners: Vec<Vec<Share>>,
+    /// Maps of displacements, and conditions that are not along axes, by number of the unknown.
+    maps: Vec<Map<D>>,
+    turned: Vec<(u32, [f64; D])>,
     levels: Vec<Level<D>>,
     bottom: Skyline,
     /// Of each node of this rank, its number among the unknowns of all; none of tied ones.
@@ -70,10 +73,11 @@ impl<const D: usize> Multigrid<D> {
         let tied = unknowns.tied();
         let number = |node: usize| nodes.numbers.get(&unknowns.lattice[node].0).copied().unwrap_or(NONE);
         let numbers = (0..tied.len()).map(|node| if tied[node] { NONE } else { number(node) }).collect();
+        let (maps, turned) = (nodes.maps, nodes.turned);
         let (places, held): (Vec<_>, Vec<_>) = nodes.free.into_iter().unzip();
         let matrix = Blocks::new(&pattern(places.len(), &corners, 1 << D));
         let levels = levels(&bricks, places, held, matrix, finest);
-        Self { bricks, corners, levels, bottom: Skyline::default(), numbers }
+        Self { bricks, corners, maps, turned, levels, bottom: Skyline::default(), numbers }
     }
 
     /// Collective, with three reductions. The matrices, from the tangents of the particles and the stiffness
@@ -87,7 +91,8 @@ impl<const D: usize> Multigrid<D> {
     ) {
         self.bricks.collect(comm, points);
         let unit = whole_unit(comm.max_f64(stiffness.iter().copied().fold(0.0, f64::max)));
-        let Some(finest) = self.levels.first_mut() else { return };
+        let mut levels = std::mem::take(&mut self.levels);
+        let Some(finest) = levels.first_mut() else { return };
         let (matrix, held) = (&mut finest.matrix, &finest.held);
         matrix.clear();
         let (count, around, axes) = (self.bricks.cells.len(), 1 << D, D << D);
@@ -100,9 +105,12 @@ impl<const D: usize> Multigrid<D> {
                     let block: [[f64; D]; D] = std::array::from_fn(|i| {
                         std::array::from_fn(|k| brick[(D * to + i) * axes + D * from + k])
                     });
-                    for &(row, row_held, share) in &corners[to] {
-                        for &(column, column_held, other) in &corners[from] {
+                    for &(row, row_held, share, row_map) in &corners[to] {
+                        for &(column, column_held, other, column_map) in &corners[from] {
                             let mut block = block;
+                            if row_map + column_map > 0 {
+                                block = between(&self.map(row_map), &block, &self.map(column_map));
+                            }
                             without_held(&mut block, row_held, column_held);
                             if let Some(sum) = matrix.block(row as usize, column) {
                                 add(sum, share * other, &block);
@@ -125,12 +133,29 @@ impl<const D: usize> Multigrid<D> {
                 block[a][a] = block[a][a].max(FLOOR * sum as f64 / unit);
             }
         }
+        for &(node, along) in &self.turned {
+            let Some(block) = matrix.block(node as usize, node) else { continue };
+            // What is held has a stiffness of its own, which no force meets.
+            let own = (0..D).map(|a| block[a][a]).fold(0.0, f64::max);
+            for (i, row) in block.iter_mut().enumerate() {
+                row.iter_mut().zip(&along).for_each(|(value, other)| *value += own * along[i] * other);
+            }
+        }
+        self.levels = levels;
         let last = self.levels.len() - 1;
         for level in 0..last {
             self.levels[level].prepare();
             self.levels[level + 1].matrix = self.levels[level].reduced(&self.levels[level + 1].held);
         }
         self.bottom = factors(&self.levels[last].matrix);
+    }
+
+    /// A map by its number.
+    fn map(&self, number: u32) -> Map<D> {
+        match number {
+            0 => std::array::from_fn(|i| std::array::from_fn(|k| if i == k { 1.0 } else { 0.0 })),
+            _ => self.maps[number as usize],
+        }
     }
 
     /// Collective, with one reduction. The preconditioner: displacements for the forces `rest` (N), masked,

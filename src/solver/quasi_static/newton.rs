@@ -7,6 +7,7 @@
 use super::multigrid::Multigrid;
 use super::points::{Points, Sweep};
 use super::unknowns::{Held, Nodal, Unknowns};
+use super::walls::Wall;
 use crate::kernel::{Row, Scheme};
 use crate::solver::state::{Effort, Solver};
 use crate::solver::step::p2g::scatter;
@@ -24,12 +25,21 @@ const FORCED: u32 = 3;
 const NEARLY_BALANCED: f64 = 1e-3;
 /// Tolerance of the first linear system, and the greatest of all.
 const FORCING: [f64; 2] = [1e-2, 0.1];
+/// Residual over the forces up to which nodes stick, slide or leave walls anew.
+const SETTLES: f64 = 1e-2;
+/// Most times that they do in a step, and times after which only those do that are most wrong.
+const ROUNDS: u32 = 60;
+const FREELY: u32 = 6;
+/// Force on a node that counts as none, over those that may be left.
+const SLACK: f64 = 0.1;
 /// Greatest displacement of a node in a step, in cells.
 pub(super) const MOST_WAY: f64 = 0.5;
 
 /// Displacements and forces at the end of an attempt.
 pub(super) struct Balance<const D: usize> {
     pub(super) effort: Effort,
+    /// How often nodes have begun to stick, to slide, or to leave walls.
+    pub(super) rounds: u32,
     /// Displacements of all nodes, m.
     pub(super) way: Nodal<D>,
     /// Forces of loads and gravity, less those of stress, N: on nodes that are held, the reaction with the sign
@@ -51,12 +61,19 @@ struct Iterate<const D: usize> {
     greatest: f64,
 }
 
+impl<const D: usize> Iterate<D> {
+    /// Norm of the unbalanced force over those of loads or stress.
+    fn residual(&self) -> f64 {
+        if self.norm > 0.0 { self.norm / self.greatest } else { 0.0 }
+    }
+}
+
 impl<const D: usize> Solver<D> {
     /// Collective. Balances the forces `outer` (N) at the end of a step of length `dt` (s). `None` if the
     /// iteration fails, with its effort.
     pub(super) fn balance_forces(
         &mut self,
-        unknowns: &Unknowns<D>,
+        unknowns: &mut Unknowns<D>,
         outer: &Nodal<D>,
         dt: f64,
         tolerance: f64,
@@ -66,23 +83,62 @@ impl<const D: usize> Solver<D> {
         let zero = vec![[0.0; D]; unknowns.nodes.len()];
         let (leaves, grid) = ((&self.forest, &self.chunks[..]), (&self.grid.plan, &self.physics.scheme()));
         let mut multigrid = Multigrid::new(&self.comm, leaves, grid, unknowns);
+        let [has_walls, has_friction] = {
+            let brakes = |wall: &Wall<D>| wall.friction > 0.0;
+            [!unknowns.walls.is_empty(), unknowns.walls.iter().any(brakes)].map(|has| self.comm.any(has))
+        };
+        let mut pulls = outer.clone();
         let Some(mut now) = self.iterate(unknowns, &mut points, outer, zero, dt) else { return Err(effort) };
         let mut forcing = FORCING[0];
         // A search for a factor of safety looks for steps that fail.
         let mut forced = if self.physics.reduction.is_some() { FORCED } else { 0 };
         let is_moved = |held: &[Option<Held>; D]| held.iter().flatten().any(|held| held.way != 0.0);
-        let mut held_is_reached = !self.comm.any(unknowns.held.iter().any(is_moved));
+        let turns = unknowns.turned.iter().flat_map(|(_, turned)| turned).any(|(_, held)| held.way != 0.0);
+        let mut held_is_reached = !self.comm.any(unknowns.held.iter().any(is_moved) || turns);
+        let (mut rounds, mut since) = (0, 0);
         loop {
-            effort.residual = if now.norm > 0.0 { now.norm / now.greatest } else { 0.0 };
-            if held_is_reached && effort.residual <= tolerance {
-                let Iterate { way, rest, .. } = now;
-                return Ok(Balance { effort, way, rest });
+            effort.residual = now.residual();
+            let mut is_other = false;
+            if has_walls
+                && held_is_reached
+                && effort.residual <= SETTLES * if rounds < FREELY { 1.0 } else { 0.1 }
+            {
+                let slack = now.norm.max(SLACK * tolerance * now.greatest);
+                let share = if rounds < FREELY { 0.0 } else { 0.5 };
+                let forces = (&now.way, &now.rest);
+                is_other = unknowns.settle_walls(&self.comm, forces, &now.stiffness, (slack, share));
+                is_other = self.comm.any(is_other);
+                if is_other {
+                    (rounds, since) = (rounds + 1, 0);
+                    unknowns.hold_at_walls();
+                    let leaves = (&self.forest, &self.chunks[..]);
+                    let grid = (&self.grid.plan, &self.physics.scheme());
+                    multigrid = Multigrid::new(&self.comm, leaves, grid, unknowns);
+                    held_is_reached = !self.comm.any(unknowns.is_off(&now.way));
+                }
+                if is_other || has_friction {
+                    pulls.clone_from(outer);
+                    unknowns.add_friction(&mut pulls);
+                    let next = self.iterate(unknowns, &mut points, &pulls, now.way, dt);
+                    let Some(next) = next else { return Err(effort) };
+                    now = next;
+                    effort.residual = now.residual();
+                }
             }
-            if effort.newton == ITERATIONS {
+            if held_is_reached && effort.residual <= tolerance {
+                if is_other && rounds < ROUNDS {
+                    continue;
+                }
+                if !is_other {
+                    let Iterate { way, rest, .. } = now;
+                    return Ok(Balance { effort, rounds, way, rest });
+                }
+            }
+            if since == ITERATIONS || rounds == ROUNDS {
                 effort.worst = unknowns.worst(&self.comm, &now.free);
                 return Err(effort);
             }
-            effort.newton += 1;
+            (effort.newton, since) = (effort.newton + 1, since + 1);
             let enough = if now.norm > 0.0 { 0.3 * tolerance * now.greatest / now.norm } else { 0.0 };
             let target = forcing.max(enough.min(0.5));
             multigrid.assemble(&self.comm, &points, &now.stiffness, unknowns);
@@ -98,7 +154,7 @@ impl<const D: usize> Solver<D> {
                     .zip(&correction)
                     .map(|(way, more)| std::array::from_fn(|a| share.mul_add(more[a], way[a])))
                     .collect();
-                let next = self.iterate(unknowns, &mut points, outer, way, dt);
+                let next = self.iterate(unknowns, &mut points, &pulls, way, dt);
                 if let Some(next) = next {
                     // Where displacements are prescribed the first correction raises the forces from nothing.
                     let is_less = next.norm < (1.0 - 1e-4 * share) * now.norm;
@@ -225,11 +281,7 @@ impl<const D: usize> Solver<D> {
         let mut correction = vec![[0.0; D]; unknowns.nodes.len()];
         let mut rest = now.free.clone();
         if !held_is_reached {
-            for ((correction, way), held) in correction.iter_mut().zip(&now.way).zip(&unknowns.held) {
-                for (a, held) in held.iter().enumerate() {
-                    correction[a] = held.map_or(0.0, |held| held.way - way[a]);
-                }
-            }
+            correction = unknowns.way_to_held(&now.way);
             let taken = self.resistance(unknowns, points, &correction);
             subtract(&mut rest, &taken, 1.0);
         }

@@ -2,10 +2,11 @@
 //!
 //! Each rank has all nodes that its particles reach, and computes the same numbers for them as every other
 //! rank; in sums each node counts once, on the rank that owns it. Tied nodes move with the corners of their
-//! ties, `u_j = Σ P_r u_r`, and pass their forces to these with the same weights.
+//! ties, `u_j = Σ P_r u_r`, and pass their forces to these with the same weights, as far as nothing holds them.
 use partition::MAX_LEVEL;
 use partition::comm::Comm;
 
+use super::walls::{Wall, dot, without};
 use crate::boundary::Contact;
 use crate::boundary::motion::Rate;
 use crate::exact_sum::ExactSum;
@@ -56,8 +57,15 @@ pub(super) struct Unknowns<const D: usize> {
     pub(super) nodes: Vec<u32>,
     /// Whether this rank counts them.
     pub(super) owned: Vec<bool>,
-    /// Prescribed displacements.
+    /// Displacements along axes that nothing releases in the step.
+    pub(super) fixed: Vec<[Option<Held>; D]>,
+    /// Walls that hold more, those of a node one after the other.
+    pub(super) walls: Vec<Wall<D>>,
+    /// Prescribed displacements along axes, with those of walls.
     pub(super) held: Vec<[Option<Held>; D]>,
+    /// Nodes with displacements that are prescribed along other directions, in the order of their numbers:
+    /// unit vectors at right angles to each other and to what is held along axes.
+    pub(super) turned: Vec<(usize, Vec<([f64; D], Held)>)>,
     /// Tied nodes with their corners, by number.
     ties: Vec<(usize, Vec<(usize, f64)>)>,
     /// Masses of the nodes, kg.
@@ -76,7 +84,10 @@ impl<const D: usize> Unknowns<D> {
         Self {
             nodes: Vec::new(),
             owned: Vec::new(),
+            fixed: Vec::new(),
+            walls: Vec::new(),
             held: Vec::new(),
+            turned: Vec::new(),
             ties: Vec::new(),
             masses: Vec::new(),
             places: Vec::new(),
@@ -122,8 +133,9 @@ impl<const D: usize> Unknowns<D> {
     /// Shares a force on tied nodes out to their corners.
     pub(super) fn gather_ties(&self, forces: &mut [[f64; D]]) {
         for (node, corners) in &self.ties {
+            let held = self.along_turned(*node, &forces[*node]);
             for a in (0..D).filter(|&a| self.held[*node][a].is_none()) {
-                let force = std::mem::replace(&mut forces[*node][a], 0.0);
+                let force = std::mem::replace(&mut forces[*node][a], held[a]) - held[a];
                 for &(corner, weight) in corners {
                     forces[corner][a] = weight.mul_add(force, forces[corner][a]);
                 }
@@ -143,18 +155,44 @@ impl<const D: usize> Unknowns<D> {
     /// Gives tied nodes the displacement of their ties.
     pub(super) fn spread_ties(&self, way: &mut [[f64; D]]) {
         for (node, corners) in &self.ties {
+            let before = way[*node];
             for a in (0..D).filter(|&a| self.held[*node][a].is_none()) {
                 let plane =
                     corners.iter().fold(0.0, |sum, &(corner, w)| f64::mul_add(w, way[corner][a], sum));
                 way[*node][a] = plane;
             }
+            if let Some(turned) = self.turned_at(*node) {
+                for (along, _) in turned {
+                    let off = dot(along, &before) - dot(along, &way[*node]);
+                    (0..D).for_each(|a| way[*node][a] = off.mul_add(along[a], way[*node][a]));
+                }
+            }
         }
+    }
+
+    /// Conditions of a node that are not along axes.
+    fn turned_at(&self, node: usize) -> Option<&[([f64; D], Held)]> {
+        let found = self.turned.binary_search_by_key(&node, |(node, _)| *node).ok()?;
+        Some(&self.turned[found].1)
+    }
+
+    /// The part of a vector at a node along these.
+    pub(super) fn along_turned(&self, node: usize, vector: &[f64; D]) -> [f64; D] {
+        let mut part = [0.0; D];
+        for (along, _) in self.turned_at(node).into_iter().flatten() {
+            let size = dot(along, vector);
+            (0..D).for_each(|a| part[a] = size.mul_add(along[a], part[a]));
+        }
+        part
     }
 
     /// Sets to 0 what is held, and tied nodes.
     pub(super) fn mask(&self, values: &mut [[f64; D]]) {
         for (value, held) in values.iter_mut().zip(&self.held) {
             (0..D).filter(|&a| held[a].is_some()).for_each(|a| value[a] = 0.0);
+        }
+        for (node, turned) in &self.turned {
+            values[*node] = turned.iter().fold(values[*node], |value, (along, _)| without(&value, along));
         }
         self.ties.iter().for_each(|(node, _)| values[*node] = [0.0; D]);
     }
@@ -234,16 +272,32 @@ impl<const D: usize> Solver<D> {
                 physics.grip(&x, [self.clock.time, middle, dt], &mut held);
                 for ((number, ((collider, state), rate)), inside) in colliders.iter().zip(&inside) {
                     if inside >> bit & 1 == 1 {
-                        let velocity = collider.velocity_at(&x, &state.pose, rate);
+                        let way = collider.velocity_at(&x, &state.pose, rate).map(|v| dt * v);
                         let by = Holder::Collider(*number);
-                        held = velocity.map(|v| Some(Held { by, way: dt * v }));
+                        match law_of(collider.contact) {
+                            None => held = way.map(|way| Some(Held { by, way })),
+                            Some(law) => {
+                                let normal = collider.normal(&x, &state.pose);
+                                let at = (unknowns.nodes.len(), by);
+                                unknowns.walls.push(Wall::new(at, normal, way, law));
+                            }
+                        }
                     }
                 }
                 physics.hold_at_faces(plan.faces_at(node), &mut held);
+                for face in (0..2 * D).filter(|face| plan.faces_at(node) >> face & 1 == 1) {
+                    let contact = physics.faces[face / 2][face % 2];
+                    if let (Contact::Separating { .. }, Some(law)) = (contact, law_of(contact)) {
+                        let inward = if face % 2 == 0 { 1.0 } else { -1.0 };
+                        let normal = std::array::from_fn(|a| if a == face / 2 { inward } else { 0.0 });
+                        let at = (unknowns.nodes.len(), Holder::Face(face));
+                        unknowns.walls.push(Wall::new(at, normal, [0.0; D], law));
+                    }
+                }
                 numbers[node] = unknowns.nodes.len() as u32;
                 unknowns.nodes.push(node as u32);
                 unknowns.owned.push(block.owned >> bit & 1 == 1);
-                unknowns.held.push(held);
+                unknowns.fixed.push(held);
                 unknowns.masses.push(rows[node].0[3]);
                 unknowns.places.push(x);
                 unknowns.cells.push(plan.cell(block.level));
@@ -253,6 +307,7 @@ impl<const D: usize> Solver<D> {
                 unknowns.lattice.push((std::array::from_fn(|a| edge * along(a)), edge));
             }
         }
+        unknowns.hold_at_walls();
         if let Some(ties) = &mut ties {
             let tied: Tied = ties.search(plan, &grid.fields, |_, _| 0);
             let number = |node: usize| numbers[node] as usize;
@@ -264,6 +319,15 @@ impl<const D: usize> Solver<D> {
         unknowns.tie_slivers();
         self.grid.ties = ties;
         unknowns
+    }
+}
+
+/// Friction of a surface, and whether material may leave it; none where it sticks.
+fn law_of(contact: Contact) -> Option<(f64, bool)> {
+    match contact {
+        Contact::Separating { friction, .. } => Some((friction, true)),
+        Contact::Slip | Contact::Symmetric => Some((0.0, false)),
+        Contact::Sticky | Contact::Outflow | Contact::Absorbing => None,
     }
 }
 

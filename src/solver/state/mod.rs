@@ -24,7 +24,7 @@ use super::migration::error::MigrateError;
 use super::migration::migrate::Moved;
 use super::sorting::box_widths::BinMissing;
 use crate::particle::Chunk;
-use crate::quantity::{FACES, NotFinite};
+use crate::quantity::NotFinite;
 use crate::solver::physics::Physics;
 use crate::solver::state::bookings::Contacts;
 use crate::solver::state::leaf_data::LeafData;
@@ -64,8 +64,9 @@ pub enum StepError {
     },
     /// Forces of a load step do not balance.
     #[error(
-        "no equilibrium at t = {to} s, in a load step of {dt} s, the shortest: after {newton} Newton and {linear} linear iterations {residual:.1e} of the forces were not balanced, most at {}; expected loads that the material can bear, or a smaller quasi_static.min_step",
-        crate::text::place(place)
+        "no equilibrium at t = {to} s, in a load step of {dt} s, the shortest: after {newton} Newton and {linear} linear iterations {residual:.1e} of the forces were not balanced, most at {}{}; expected loads that the material can bear, or a smaller quasi_static.min_step",
+        crate::text::place(place),
+        if *slides { ", and material slides wherever friction should hold it" } else { "" }
     )]
     NoBalance {
         /// Time at the end of the step, s.
@@ -80,14 +81,8 @@ pub enum StepError {
         residual: f64,
         /// Where most of it is, in the coordinates of the job, m.
         place: Vec<f64>,
-    },
-    /// Material of a quasi-static job has come to a face that only bears pressure.
-    #[error(
-        "material has reached the face boundaries.{}, which is separating; expected sticky, slip or symmetric faces where material rests in a quasi-static job", FACES[face / 2][face % 2]
-    )]
-    Face {
-        /// The face: `2 axis`, one more for the upper.
-        face: usize,
+        /// Whether material slides wherever friction should hold it.
+        slides: bool,
     },
     /// The time after the step is not finite, or no later than that before it.
     #[error("a step of {dt} s from t = {from} s would end at t = {to} s; expected a later, finite time")]

@@ -1,0 +1,361 @@
+//! Walls along which material slides, or which it may leave: what they hold of the nodes.
+//!
+//! A wall holds a node on it or inside it along its normal n, `n·u = n·s`, with its own displacement s. One
+//! that separates does so only while it presses, and friction holds all of the displacement, with a force of
+//! at most μ N (Coulomb). Which of these is so is found as the iteration goes on (an active set): each step
+//! begins with all nodes held; a node that is pulled leaves, one that comes too near is held again, one
+//! whose force is too great slides, and one that slides back with its friction sticks. After some rounds only
+//! nodes that are most wrong change, lest they go in circles. The friction of nodes
+//! that slide is that of the normal force before, so the stiffness stays symmetric.
+//!
+//! Conditions that are not along axes are kept as unit vectors at right angles to each other, and taken out
+//! of displacements and forces by projection.
+use partition::comm::Comm;
+
+use super::unknowns::{Held, Holder, Nodal, Unknowns};
+
+/// Displacement, in cells, below which a node is where it should be.
+const SAME: f64 = 1e-9;
+/// Part of a unit vector beside those that hold a node already from which it is another condition.
+const OTHER: f64 = 0.05;
+
+/// What a wall does at a node.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum State {
+    /// Nothing: the node has left.
+    Away,
+    /// It holds the node along its normal.
+    Slides,
+    /// It holds the node in all directions.
+    Sticks,
+}
+
+/// A wall at a node.
+#[derive(Clone, Debug)]
+pub(super) struct Wall<const D: usize> {
+    /// Number of the node.
+    pub(super) node: usize,
+    pub(super) by: Holder,
+    /// Unit normal, to the material.
+    pub(super) normal: [f64; D],
+    /// Displacement of the wall in the step, m.
+    pub(super) way: [f64; D],
+    /// Coefficient of friction.
+    pub(super) friction: f64,
+    /// Whether the node may leave.
+    pub(super) separates: bool,
+    pub(super) state: State,
+    /// The direction that it alone holds: its normal without what else holds the node; 0 where that is all.
+    pub(super) along: [f64; D],
+    /// Friction on a node that slides, N.
+    pub(super) push: [f64; D],
+}
+
+impl<const D: usize> Wall<D> {
+    /// A wall at a node, with which a step begins.
+    pub(super) fn new(
+        (node, by): (usize, Holder),
+        normal: [f64; D],
+        way: [f64; D],
+        (friction, separates): (f64, bool),
+    ) -> Self {
+        let state = if friction > 0.0 { State::Sticks } else { State::Slides };
+        Self { node, by, normal, way, friction, separates, state, along: [0.0; D], push: [0.0; D] }
+    }
+
+    /// What a node with this displacement (m) and this force that the wall has to bear (N) should do;
+    /// displacements up to `near` (m) and forces up to `slack` (N) count as none. `free` takes out of a vector
+    /// what else holds the node. A node goes from sticking to leaving and back over sliding: what sticks may
+    /// pull though what slides presses.
+    fn next(
+        &self,
+        way: &[f64; D],
+        rest: &[f64; D],
+        (near, slack): (f64, f64),
+        free: impl Fn([f64; D]) -> [f64; D],
+    ) -> Next<D> {
+        let off: [f64; D] = std::array::from_fn(|a| way[a] - self.way[a]);
+        let stays = Next { state: self.state, push: self.push, excess: 0.0 };
+        let slides = |push: [f64; D], excess: f64| Next { state: State::Slides, push, excess };
+        if self.state == State::Away {
+            let into = -dot(&off, &self.normal);
+            return if into > near { slides([0.0; D], slack / near * into) } else { stays };
+        }
+        let share = dot(&self.normal, &self.along);
+        if share <= 0.0 {
+            return stays;
+        }
+        let pressure = -dot(rest, &self.along) / share;
+        let is_pulled = self.separates && pressure < -slack;
+        let most = self.friction * pressure.max(0.0);
+        let tangential = |v: [f64; D]| without(&free(v), &self.along);
+        let size_of = |v: &[f64; D]| dot(v, v).sqrt();
+        match self.state {
+            State::Sticks => {
+                let needed = tangential(rest.map(|force| -force));
+                let size = size_of(&needed);
+                let push = if size > 0.0 { needed.map(|force| most / size * force) } else { needed };
+                let is_held = !is_pulled && size <= most + slack;
+                if is_held { stays } else { slides(push, (size - most).max(-pressure)) }
+            }
+            _ if is_pulled => Next { state: State::Away, push: [0.0; D], excess: -pressure },
+            _ if self.friction > 0.0 => {
+                let slip = tangential(off);
+                let (size, bears) = (size_of(&slip), size_of(&self.push));
+                let along = dot(&slip, &self.push);
+                if size > near && along > 0.0 {
+                    return Next {
+                        state: State::Sticks,
+                        push: [0.0; D],
+                        excess: slack / near * along / bears,
+                    };
+                }
+                let push = if size > near {
+                    slip.map(|slip| -most / size * slip)
+                } else if bears > 0.0 {
+                    self.push.map(|force| most / bears * force)
+                } else {
+                    self.push
+                };
+                Next { push, ..stays }
+            }
+            _ => stays,
+        }
+    }
+}
+
+/// What a node should do.
+#[derive(Clone, Copy, Debug)]
+struct Next<const D: usize> {
+    state: State,
+    /// Friction, N.
+    push: [f64; D],
+    /// Force by which the present state is wrong, N.
+    excess: f64,
+}
+
+/// Conditions of a node, at right angles to each other.
+struct Frame<const D: usize> {
+    along: Vec<([f64; D], Held)>,
+}
+
+impl<const D: usize> Frame<D> {
+    fn of(held: &[Option<Held>; D]) -> Self {
+        let along = (0..D).filter_map(|a| held[a].map(|held| (axis(a), held)));
+        Self { along: along.collect() }
+    }
+
+    /// Adds a displacement `way · direction` by a wall. Returns the part of the direction that nothing held
+    /// before, as a unit vector; none if that is next to nothing.
+    fn add(&mut self, direction: &[f64; D], way: &[f64; D], by: Holder) -> Option<[f64; D]> {
+        let (mut rest, mut value) = (*direction, dot(direction, way));
+        for (known, held) in &self.along {
+            let part = dot(&rest, known);
+            value = (-part).mul_add(held.way, value);
+            rest = without(&rest, known);
+        }
+        let size = dot(&rest, &rest).sqrt();
+        if size < OTHER {
+            return None;
+        }
+        let (mut rest, mut value) = (rest.map(|x| x / size), value / size);
+        let mut found = rest;
+        if let Some(a) = (0..D).find(|&a| rest[a].abs() > 1.0 - SAME) {
+            let sign = rest[a].signum();
+            (rest, value) = (axis(a), sign * value);
+            found = rest.map(|x| sign * x);
+        }
+        self.along.push((rest, Held { by, way: value }));
+        Some(found)
+    }
+
+    /// Conditions along axes, and the others; those along axes in `fixed` stay as they are.
+    fn split(self, fixed: &[Option<Held>; D]) -> ([Option<Held>; D], Vec<([f64; D], Held)>) {
+        let mut held = *fixed;
+        if self.along.len() == D {
+            let all = |a: usize| self.along.iter().fold(0.0, |sum, (e, own)| e[a].mul_add(own.way, sum));
+            let by = self.along.last().map(|(_, held)| held.by);
+            for a in 0..D {
+                held[a] = held[a].or(by.map(|by| Held { by, way: all(a) }));
+            }
+            return (held, Vec::new());
+        }
+        let mut turned = Vec::new();
+        for (along, own) in self.along {
+            match (0..D).find(|&a| along[a] == 1.0) {
+                Some(a) => held[a] = held[a].or(Some(own)),
+                None => turned.push((along, own)),
+            }
+        }
+        (held, turned)
+    }
+}
+
+impl<const D: usize> Unknowns<D> {
+    /// Holds nodes as the states of the walls say.
+    pub(super) fn hold_at_walls(&mut self) {
+        self.held.clone_from(&self.fixed);
+        self.turned.clear();
+        for walls in self.walls.chunk_by_mut(|a, b| a.node == b.node) {
+            let node = walls[0].node;
+            let mut frame = Frame::of(&self.fixed[node]);
+            for wall in walls {
+                wall.along = [0.0; D];
+                if wall.state == State::Away {
+                    continue;
+                }
+                wall.along = frame.add(&wall.normal, &wall.way, wall.by).unwrap_or([0.0; D]);
+                if wall.state == State::Sticks {
+                    for a in 0..D {
+                        let _ = frame.add(&axis(a), &wall.way, wall.by);
+                    }
+                }
+            }
+            let (held, turned) = frame.split(&self.fixed[node]);
+            self.held[node] = held;
+            if !turned.is_empty() {
+                self.turned.push((node, turned));
+            }
+        }
+    }
+
+    /// Collective, with one reduction. Finds the states of the walls, and friction, from displacements (m), the
+    /// forces that are left (N) and the stiffness of the nodes, N/m; forces up to `slack` (N) count as none.
+    /// States change where they are most wrong: down to a `share` of the greatest excess. Returns whether any
+    /// is another on this rank.
+    pub(super) fn settle_walls(
+        &mut self,
+        comm: &Comm,
+        (way, rest): (&Nodal<D>, &Nodal<D>),
+        stiffness: &[f64],
+        (slack, share): (f64, f64),
+    ) -> bool {
+        let next = |wall: &Wall<D>| {
+            let (node, fixed) = (wall.node, &self.fixed[wall.node]);
+            let free = |v: [f64; D]| std::array::from_fn(|a| if fixed[a].is_some() { 0.0 } else { v[a] });
+            let least = SAME * self.cells[node];
+            let near = if stiffness[node] > 0.0 { (slack / stiffness[node]).max(least) } else { least };
+            wall.next(&way[node], &rest[node], (near, slack), free)
+        };
+        let all: Vec<Next<D>> = self.walls.iter().map(next).collect();
+        let wrong =
+            |(wall, next): (&Wall<D>, &Next<D>)| if wall.state == next.state { 0.0 } else { next.excess };
+        let most = comm.max_f64(self.walls.iter().zip(&all).map(wrong).fold(0.0, f64::max));
+        let mut is_other = false;
+        for (wall, next) in self.walls.iter_mut().zip(&all) {
+            if wall.state == next.state {
+                wall.push = next.push;
+            } else if next.excess >= share * most {
+                (wall.state, wall.push) = (next.state, next.push);
+                is_other = true;
+            }
+        }
+        is_other
+    }
+
+    /// Adds the friction of nodes that slide.
+    pub(super) fn add_friction(&self, forces: &mut Nodal<D>) {
+        for wall in &self.walls {
+            (0..D).for_each(|a| forces[wall.node][a] += wall.push[a]);
+        }
+    }
+
+    /// Whether any node of this rank slides against friction, and whether friction holds any.
+    pub(super) fn slides(&self) -> [bool; 2] {
+        let has = |state: State| self.walls.iter().any(|wall| wall.friction > 0.0 && wall.state == state);
+        [has(State::Slides), has(State::Sticks)]
+    }
+
+    /// What is left to the prescribed displacements; 0 for what is free.
+    pub(super) fn way_to_held(&self, way: &Nodal<D>) -> Nodal<D> {
+        let along = |(way, held): (&[f64; D], &[Option<Held>; D])| {
+            std::array::from_fn(|a| held[a].map_or(0.0, |held| held.way - way[a]))
+        };
+        let mut left: Nodal<D> = way.iter().zip(&self.held).map(along).collect();
+        for (node, turned) in &self.turned {
+            for (along, held) in turned {
+                let off = held.way - dot(along, &way[*node]);
+                (0..D).for_each(|a| left[*node][a] = off.mul_add(along[a], left[*node][a]));
+            }
+        }
+        left
+    }
+
+    /// Whether any node of this rank is not where it is held.
+    pub(super) fn is_off(&self, way: &Nodal<D>) -> bool {
+        let left = self.way_to_held(way);
+        left.iter().zip(&self.cells).any(|(left, cell)| left.iter().any(|left| left.abs() > SAME * cell))
+    }
+}
+
+/// Unit vector along an axis.
+fn axis<const D: usize>(a: usize) -> [f64; D] {
+    std::array::from_fn(|b| if a == b { 1.0 } else { 0.0 })
+}
+
+pub(super) fn dot<const D: usize>(a: &[f64; D], b: &[f64; D]) -> f64 {
+    (0..D).fold(0.0, |sum, k| a[k].mul_add(b[k], sum))
+}
+
+/// A vector without its part along a unit vector.
+pub(super) fn without<const D: usize>(v: &[f64; D], along: &[f64; D]) -> [f64; D] {
+    let part = dot(v, along);
+    std::array::from_fn(|a| (-part).mul_add(along[a], v[a]))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const WALL: Holder = Holder::Collider(0);
+
+    /// Whatever else holds a node, it moves with the wall along its normal.
+    #[test]
+    fn conditions_along_all_directions_hold_at_once() {
+        let fixed = [None, Some(Held { by: Holder::Face(2), way: 0.25 }), None];
+        let walls = [([0.6, 0.0, 0.8], [1.0, 2.0, 3.0]), ([0.0, 0.6, -0.8], [-1.0, 0.5, 0.0])];
+        let mut frame = Frame::of(&fixed);
+        assert!(walls.iter().all(|(normal, way)| frame.add(normal, way, WALL).is_some()));
+        let (held, turned) = frame.split(&fixed);
+        assert!(turned.is_empty());
+        let way = held.map(|held| held.map_or(f64::NAN, |held| held.way));
+        assert_eq!(way[1], 0.25);
+        for (normal, of_wall) in walls {
+            assert!((dot(&normal, &way) - dot(&normal, &of_wall)).abs() < 1e-14, "{way:?}");
+        }
+    }
+
+    #[test]
+    fn a_normal_that_a_face_holds_already_adds_nothing() {
+        let fixed = [Some(Held { by: Holder::Face(0), way: 0.0 }), None];
+        assert!(Frame::of(&fixed).add(&[-1.0, 0.0], &[1.0, 1.0], WALL).is_none());
+        let mut frame = Frame::of(&fixed);
+        assert_eq!(frame.add(&[0.6, -0.8], &[0.0, 1.0], WALL), Some([0.0, -1.0]));
+        let (held, turned) = frame.split(&fixed);
+        // Along 0.6 x - 0.8 y the wall moves by -0.8, and x is fixed.
+        assert!(turned.is_empty() && held[1].is_some_and(|held| (held.way - 1.0).abs() < 1e-14), "{held:?}");
+    }
+
+    /// What a node at a wall below with this displacement does that bears this force.
+    fn next(state: State, way: [f64; 2], rest: [f64; 2]) -> (State, [f64; 2]) {
+        let mut wall = Wall::new((0, WALL), [0.0, 1.0], [0.0; 2], (0.5, true));
+        (wall.state, wall.along, wall.push) = (state, [0.0, 1.0], [1.0, 0.0]);
+        let next = wall.next(&way, &rest, (1e-9, 1e-9), |v| v);
+        assert!(next.excess > 0.0 || next.state == state, "{next:?}");
+        (next.state, next.push)
+    }
+
+    #[test]
+    fn nodes_leave_stick_and_slide_as_they_should() {
+        assert_eq!(next(State::Sticks, [0.0; 2], [4.9, -10.0]).0, State::Sticks);
+        assert_eq!(next(State::Sticks, [0.0; 2], [8.0, -10.0]), (State::Slides, [-5.0, 0.0]));
+        // Against its slip, under the present force; it sticks where friction would drive it.
+        assert_eq!(next(State::Slides, [-0.1, 0.0], [0.0, -4.0]), (State::Slides, [2.0, 0.0]));
+        assert_eq!(next(State::Slides, [0.1, 0.0], [0.0, -4.0]).0, State::Sticks);
+        // What is pulled slides before it leaves.
+        assert_eq!(next(State::Sticks, [0.0; 2], [0.0, 1.0]).0, State::Slides);
+        assert_eq!(next(State::Slides, [0.0; 2], [0.0, 1.0]).0, State::Away);
+        assert_eq!(next(State::Away, [0.0, 0.1], [0.0; 2]).0, State::Away);
+        assert_eq!(next(State::Away, [0.0, -0.1], [0.0; 2]), (State::Slides, [0.0; 2]));
+    }
+}

@@ -1,0 +1,228 @@
+//! Claim: in load steps material slides along walls in any direction and leaves those that only press, with the same
+//! bits on any ranks and across restarts.
+
+use std::path::Path;
+
+use crate::common::history::History;
+use crate::common::restart;
+
+/// A block of 1 m between a floor and a plate that presses it by 2 mm, all turned about (1, 1) by an angle.
+/// A grip at its middle keeps it from sliding away.
+fn press(degrees: f64, contact: &str) -> String {
+    let (sine, cosine) = degrees.to_radians().sin_cos();
+    let below = [1.0 + 0.5 * sine, 1.0 - 0.5 * cosine];
+    let above = [1.0 - 0.5 * sine, 1.0 + 0.5 * cosine];
+    let way = [0.002 * sine, -0.002 * cosine];
+    format!(
+        r#"
+version = 1
+dimension = 2
+[domain]
+size = [2, 2]
+root_edge = 2
+[boundaries]
+x_min.kind = "slip"
+x_max.kind = "slip"
+y_min.kind = "slip"
+y_max.kind = "slip"
+[tree]
+base_level = 3
+[[materials]]
+name = "rubber"
+density = 1000
+model = "hencky"
+young = 1e6
+poisson = 0.3
+[[bodies]]
+name = "block"
+material = "rubber"
+[bodies.shape]
+kind = "rotated"
+centre = [1, 1]
+angle = {degrees}
+shape = {{ kind = "box", min = [0.5, 0.5], max = [1.5, 1.5] }}
+[[colliders]]
+name = "floor"
+shape = {{ kind = "half_space", point = {below:?}, normal = [{:?}, {cosine:?}] }}
+contact = {contact}
+[[colliders]]
+name = "plate"
+shape = {{ kind = "half_space", point = {above:?}, normal = [{sine:?}, {:?}] }}
+motion = {{ kind = "table", rows = [{{ time = 0, translation = [0, 0] }}, {{ time = 1, translation = {way:?} }}] }}
+contact = {contact}
+[[loads]]
+name = "middle"
+kind = "velocity"
+x = {:?}
+y = {:?}
+shape = {{ kind = "box", min = [0.99, 0.99], max = [1.01, 1.01] }}
+[quasi_static]
+step = 1
+[time]
+end = 1
+[output]
+picture = false
+[history]
+every_steps = 1
+"#,
+        -sine,
+        -cosine,
+        0.5 * way[0],
+        0.5 * way[1]
+    )
+}
+
+/// Forces of the plate on the block along its normal and across it, N.
+fn pressed(degrees: f64, contact: &str, arguments: &[&str]) -> [f64; 2] {
+    let found = History::of_job("press", &press(degrees, contact), arguments);
+    let [floor, plate] =
+        ["floor", "plate"].map(|name| ["x", "y"].map(|a| found.last(&format!("force_{name}_{a}"))));
+    let (sine, cosine) = degrees.to_radians().sin_cos();
+    let size = plate[0].hypot(plate[1]);
+    assert!((0..2).all(|a| (floor[a] + plate[a]).abs() < 1e-5 * size), "{floor:?} {plate:?}");
+    [cosine.mul_add(plate[1], -sine * plate[0]), cosine.mul_add(plate[0], sine * plate[1])]
+}
+
+/// In plane strain a smooth press needs `E / (1 - ν²)` times the strain, whatever its direction. Plates whose
+/// surface is not on nodes hold those behind it, so that the block is longer by a share of a cell: half as much
+/// with cells of half the edge.
+#[test]
+fn smooth_plates_of_any_direction_press_as_theory_says() {
+    let exact = 0.002 * 1e6 / (1.0 - 0.3 * 0.3);
+    for (degrees, within) in [(0.0, 0.01), (17.0, 0.2), (30.0, 0.2)] {
+        let off = [3, 4].map(|level| {
+            let level = format!("tree.base_level={level}");
+            let [across, along] = pressed(degrees, "{ kind = 'slip' }", &["--set", &level]);
+            assert!(along.abs() < 1e-5 * across, "{degrees}: {along}");
+            across / exact - 1.0
+        });
+        println!("{degrees}: {:+.1} %, {:+.1} %", 100.0 * off[0], 100.0 * off[1]);
+        assert!(off[0].abs() < within && off[1].abs() < 0.6 * within, "{degrees}: {off:?}");
+    }
+}
+
+/// An elastic block of 500 kg on the lower face.
+fn on_floor(gravity: &str, floor: &str, loads: &str) -> String {
+    format!(
+        r#"
+version = 1
+dimension = 2
+gravity = {gravity}
+[domain]
+size = [2, 1]
+root_edge = 1
+[boundaries]
+x_min.kind = "slip"
+x_max.kind = "slip"
+y_min = {floor}
+y_max.kind = "slip"
+[tree]
+base_level = 2
+[[materials]]
+name = "rubber"
+density = 1000
+model = "hencky"
+young = 1e6
+poisson = 0.3
+[[bodies]]
+name = "block"
+material = "rubber"
+shape = {{ kind = "box", min = [0.5, 0], max = [1.5, 0.5] }}
+{loads}
+[quasi_static]
+step = 0.25
+[time]
+end = 1
+[output]
+picture = false
+[history]
+every_steps = 1
+face_forces = true
+"#
+    )
+}
+
+#[test]
+fn a_body_leaves_a_face_that_only_bears_pressure() {
+    let pull = "[[loads]]\nname = 'pull'\nkind = 'velocity'\nx = 0\ny = 0.01\n\
+                shape = { kind = 'box', min = [0.4, 0.36], max = [1.6, 0.6] }";
+    let found = History::of_job("lift", &on_floor("[0, -10]", "{ kind = 'separating' }", pull), &[]);
+    let [floor, pull] = ["force_y_min_y", "load_pull_y"].map(|name| found.last(name));
+    println!("floor {floor:.2e} N, pull {pull:.3} N");
+    assert!(floor.abs() < 1e-2 && (pull / 5000.0 - 1.0).abs() < 1e-5, "{floor} {pull}");
+}
+
+/// A block on a turned plane, partly beyond its edge, under a plate that moves along it, pinned below: gaps and two
+/// levels.
+#[test]
+fn walls_in_load_steps_give_the_same_on_any_ranks_and_across_restart() {
+    let (sine, cosine) = 20.0_f64.to_radians().sin_cos();
+    let job = format!(
+        r#"
+version = 1
+dimension = 2
+gravity = [0, -10]
+[domain]
+size = [2, 2]
+root_edge = 0.5
+[boundaries]
+x_min.kind = "separating"
+x_max = {{ kind = "separating" }}
+y_min.kind = "separating"
+y_max.kind = "slip"
+[tree]
+base_level = 1
+regions = [{{ level = 2, shape = {{ kind = "box", min = [0.5, 0.5], max = [1.2, 1.5] }} }}]
+[[materials]]
+name = "clay"
+density = 1000
+model = "von_mises"
+young = 1e6
+poisson = 0.3
+yield_stress = 3e4
+[[bodies]]
+name = "block"
+material = "clay"
+[bodies.shape]
+kind = "rotated"
+centre = [1, 0.8]
+angle = 20
+shape = {{ kind = "box", min = [0.5, 0.8], max = [1.5, 1.3] }}
+[[colliders]]
+name = "plane"
+shape = {{ kind = "half_space", point = [1, 0.8], normal = [{:?}, {cosine:?}] }}
+contact = {{ kind = "slip" }}
+[[colliders]]
+name = "plate"
+shape = {{ kind = "rotated", centre = [1, 0.8], angle = 20, shape = {{ kind = "box", min = [0.6, 1.3], max = [1, 1.5] }} }}
+motion = {{ kind = "steady", velocity = [{:?}, {:?}] }}
+contact = {{ kind = "separating" }}
+[[loads]]
+name = "pin"
+kind = "velocity"
+x = 0
+y = 0
+shape = {{ kind = "box", min = [0.99, 0.95], max = [1.01, 1.02] }}
+[quasi_static]
+step = 0.25
+tolerance = 1e-5
+[time]
+end = 1
+[output]
+picture = false
+[history]
+every_steps = 1
+[checkpoint]
+every_steps = 1
+keep = 99
+"#,
+        -sine,
+        0.005f64.mul_add(sine, 0.002 * cosine),
+        0.002f64.mul_add(sine, -0.005 * cosine),
+    );
+    restart::assert_same_on_any_ranks(&job, "walls", |directory: &Path, _| {
+        let found = History::read(directory, "walls");
+        let rest = found.column("unbalanced_force");
+        assert!(rest.iter().all(|rest| *rest <= 1e-5), "{rest:?}");
+    });
+}
