@@ -62,6 +62,7 @@ const TEMPLATES: &[Template] = templates![
     "cantilever";
     "thick_cylinder";
     "thick_cylinder_load_steps";
+    "cavity_expansion_axisymmetric";
     "rubber_block_load_steps";
     "oblique_disks";
     "elastic_cubes";
@@ -70,6 +71,7 @@ const TEMPLATES: &[Template] = templates![
     "charge_in_sand";
     "taylor_bar" quick "tree.base_level=1", "adaptivity.criteria.0.level=3", "adaptivity.criteria.1.level=2";
     "taylor_bar_johnson_cook" quick "tree.base_level=1", "adaptivity.criteria.0.level=2", "adaptivity.criteria.1.level=2";
+    "taylor_bar_johnson_cook_axisymmetric" quick "tree.base_level=2";
     "bunny" with "meshes/bunny.obj" quick "tree.regions.0.level=2";
     "snow_bunny" with "meshes/bunny.obj";
 ];
