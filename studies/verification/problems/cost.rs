@@ -5,13 +5,13 @@ use crate::plot::{Chart, Series};
 use crate::runs::Runs;
 
 /// Runs of a scene: cells, error, processor time (s).
-struct Scene {
-    id: &'static str,
-    name: &'static str,
-    uniform: Vec<(String, f64, f64)>,
-    refined: Vec<(String, f64, f64)>,
+pub(super) struct Scene {
+    pub id: &'static str,
+    pub name: &'static str,
+    pub uniform: Vec<(String, f64, f64)>,
+    pub refined: Vec<(String, f64, f64)>,
     /// Why it gains what it gains.
-    bound: &'static str,
+    pub bound: &'static str,
 }
 
 impl Scene {
@@ -53,21 +53,34 @@ pub(crate) fn section(runs: &Runs, page: &mut Page) {
         collapse(runs),
         manufactured(runs),
     ];
+    let gains = table(page, &scenes);
+    let at_least = |bound: f64| gains.iter().filter(|gain| **gain >= bound).count() as f64;
+    page.line("cost.ten", at_least(10.0));
+    page.line("cost.five", at_least(5.0));
+    for scene in &scenes {
+        scene.curves(page);
+    }
+}
+
+/// Writes the gains of scenes.
+pub(super) fn table(page: &mut Page, scenes: &[Scene]) -> Vec<f64> {
     let mut gains = Vec::new();
     let mut rows = Vec::new();
-    for scene in &scenes {
+    for scene in scenes {
         let (gain, is_bound) = scene.gain();
         page.line(&format!("cost.{}", scene.id), gain);
         gains.push(gain);
         let sign = if is_bound { "≥ " } else { "" };
         rows.push(vec![scene.name.to_owned(), format!("{sign}{gain:.1}"), scene.bound.to_owned()]);
     }
-    let at_least = |bound: f64| gains.iter().filter(|gain| **gain >= bound).count() as f64;
-    page.line("cost.ten", at_least(10.0));
-    page.line("cost.five", at_least(5.0));
     page.table(&["scene", "gain at equal error", "what bounds it"], &rows);
-    for scene in scenes {
-        let rows: Vec<Vec<String>> = [("uniform", &scene.uniform), ("refined", &scene.refined)]
+    gains
+}
+
+impl Scene {
+    /// Writes errors and times of its runs.
+    pub(super) fn curves(&self, page: &mut Page) {
+        let rows: Vec<Vec<String>> = [("uniform", &self.uniform), ("refined", &self.refined)]
             .into_iter()
             .flat_map(|(tree, points)| {
                 points.iter().map(move |(cells, error, time)| {
@@ -75,20 +88,20 @@ pub(crate) fn section(runs: &Runs, page: &mut Page) {
                 })
             })
             .collect();
-        page.text(&format!("*{}*\n", scene.name));
-        rows.iter().for_each(|row| println!("    {} {}", scene.id, row.join("  ")));
+        page.text(&format!("*{}*\n", self.name));
+        rows.iter().for_each(|row| println!("    {} {}", self.id, row.join("  ")));
         page.table(&["tree", "finest cells", "error", "processor time, s"], &rows);
         let curve =
             |points: &[(String, f64, f64)]| points.iter().map(|(_, error, time)| [*time, *error]).collect();
         page.plot(
-            &format!("cost_{}", scene.id),
+            &format!("cost_{}", self.id),
             &Chart {
-                title: scene.name,
+                title: self.name,
                 labels: ["processor time, s", "error"],
                 logarithmic: [true, true],
                 series: vec![
-                    Series { name: "uniform".into(), points: curve(&scene.uniform), marks: false },
-                    Series { name: "refined".into(), points: curve(&scene.refined), marks: false },
+                    Series { name: "uniform".into(), points: curve(&self.uniform), marks: false },
+                    Series { name: "refined".into(), points: curve(&self.refined), marks: false },
                 ],
             },
         );

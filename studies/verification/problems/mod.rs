@@ -16,6 +16,7 @@ pub(crate) mod incline;
 pub(crate) mod manufactured;
 pub(crate) mod plates;
 pub(crate) mod rest;
+pub(crate) mod rings;
 pub(crate) mod taylor;
 pub(crate) mod water;
 pub(crate) mod weights;
@@ -24,7 +25,7 @@ pub(crate) mod weights;
 pub(crate) type Problem = fn(&Runs, &mut Page);
 
 /// All of them, in the order of the page.
-pub(crate) const ALL: [(&str, Problem); 20] = [
+pub(crate) const ALL: [(&str, Problem); 21] = [
     ("bar", bar::section),
     ("in_time", bar::in_time),
     ("manufactured", manufactured::square),
@@ -45,6 +46,7 @@ pub(crate) const ALL: [(&str, Problem); 20] = [
     ("contact", contact::section),
     ("footing", footing::section),
     ("cost", cost::section),
+    ("cost_of_rings", rings::section),
 ];
 
 /// Order of convergence of errors from one number of cells to another.
