@@ -4,6 +4,7 @@
 use std::path::Path;
 
 use crate::common::history::History;
+use crate::common::launch::{run, text};
 use crate::common::restart;
 
 /// A block of 1 m between a floor and a plate that presses it by 2 mm, all turned about (1, 1) by an angle.
@@ -150,6 +151,36 @@ fn a_body_leaves_a_face_that_only_bears_pressure() {
     let [floor, pull] = ["force_y_min_y", "load_pull_y"].map(|name| found.last(name));
     println!("floor {floor:.2e} N, pull {pull:.3} N");
     assert!(floor.abs() < 1e-2 && (pull / 5000.0 - 1.0).abs() < 1e-5, "{floor} {pull}");
+}
+
+/// Pushed from behind, it slides under μ times its weight.
+#[test]
+fn a_block_that_is_pushed_slides_as_coulomb_says() {
+    let push = "[[loads]]\nname = 'push'\nkind = 'velocity'\nx = 0.02\n\
+                shape = { kind = 'box', min = [0.4, 0.03], max = [0.57, 0.6] }";
+    let floor = "{ kind = 'separating', friction = 0.3 }";
+    let found = History::of_job("push", &on_floor("[0, -10]", floor, push), &[]);
+    let [push, floor] = ["load_push_x", "force_y_min_x"].map(|name| found.last(name));
+    println!("push {push:.2} N, floor {floor:.2} N");
+    assert!((push / 1500.0 - 1.0).abs() < 0.01 && (floor / 1500.0 - 1.0).abs() < 0.01, "{push} {floor}");
+}
+
+/// Gravity turns: a block sticks up to a slope of tan φ, and has no equilibrium beyond.
+#[test]
+fn a_block_on_a_slope_sticks_up_to_the_angle_of_friction() {
+    let floor = "{ kind = 'separating', friction = 0.3 }";
+    let job = on_floor("[[[0, 0], [1, 6]], -10]", floor, "");
+    let directory = tempfile::tempdir().expect("temporary directory");
+    let path = directory.path().join("slope.toml");
+    std::fs::write(&path, job).expect("job");
+    let output = run(directory.path(), 1, 1, &path, &["--quiet"]).output().expect("output");
+    let words = text(&output);
+    let is_told = words.contains("no equilibrium at t = ")
+        && words.contains("material slides wherever friction should hold it");
+    assert!(!output.status.success() && is_told, "{words}");
+    let reached = History::read(directory.path(), "slope").last("time");
+    println!("stands at {:.4} of the limit", reached / 0.5);
+    assert!((0.98..1.0 + 1e-6).contains(&(reached / 0.5)), "{reached}");
 }
 
 /// A block on a turned plane, partly beyond its edge, under a plate that moves along it, pinned below: gaps and two

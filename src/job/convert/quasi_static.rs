@@ -88,7 +88,7 @@ pub(super) fn check<const D: usize>(checks: &mut Checks, file: &JobFile, problem
                 let is_named = number > 0 || problem.named_faces[axis][side];
                 let here = path.key("boundaries").key(FACES[axis][side]);
                 let (found, expected) = match faces[axis][side] {
-                    Some(contact) if has_shear(contact) => ("friction, cohesion or drag", "none"),
+                    Some(contact) if contact.acts_by_area() => ("cohesion or drag", "friction alone"),
                     Some(Contact::Absorbing) => ("a face that absorbs waves", "another kind"),
                     _ => continue,
                 };
