@@ -47,6 +47,7 @@ const TEMPLATES: &[Template] = templates![
     "shaken_slope" with "records/tapered_sine.csv";
     "excavation";
     "excavation_load_steps";
+    "retaining_wall_load_steps";
     "slope_factor_of_safety";
     "ground_at_rest";
     "drawdown";

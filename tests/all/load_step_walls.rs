@@ -257,3 +257,16 @@ keep = 99
         assert!(rest.iter().all(|rest| *rest <= 1e-5), "{rest:?}");
     });
 }
+
+/// A smooth wall that moves into soil bears Rankine's passive pressure, `γ H² K / 2 + 2 c H √K` with K = 3.
+#[test]
+fn a_wall_bears_the_passive_pressure_of_soil() {
+    let job = include_str!("../../jobs/retaining_wall_load_steps.toml");
+    let found = History::of_job("retaining_wall", job, &[]);
+    let exact = 0.5 * 1800.0 * 9.81 * 3.0 + 2.0 * 2000.0 * 3.0_f64.sqrt();
+    let (time, force) = (found.column("time"), found.column("force_wall_x"));
+    for (time, force) in time.iter().zip(force).filter(|(time, _)| **time > 0.35) {
+        println!("{time:.2}: {:.4}", -force / exact);
+        assert!((-force / exact - 1.0).abs() < 0.04, "{time}: {force} of {exact}");
+    }
+}
