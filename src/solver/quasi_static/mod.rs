@@ -7,6 +7,7 @@
 //!
 //! | file | what it holds |
 //! |---|---|
+//! | `held` | what holds a node, and what a wall lets go of |
 //! | `unknowns` | nodes, what holds them, ties, products |
 //! | `walls` | where they slide, stick or leave |
 //! | `points` | stress and tangent of the particles |
@@ -22,6 +23,7 @@
 mod blocks;
 mod bricks;
 mod everywhere;
+mod held;
 mod lattice;
 mod multigrid;
 mod newton;
@@ -31,9 +33,9 @@ mod strength;
 mod unknowns;
 mod walls;
 
+use self::held::{Holder, Wall, dot};
 use self::newton::MOST_WAY;
-use self::unknowns::{Holder, Nodal, Unknowns};
-use self::walls::{Wall, dot};
+use self::unknowns::{Nodal, Unknowns};
 use super::step::colliders::Touch;
 use crate::boundary::motion::Rate;
 use crate::exact_sum::ExactSum;

@@ -4,10 +4,10 @@
 //! and of stress. A correction solves the linearised balance, with the prescribed displacements as far as they
 //! are not reached, to a tolerance that falls with the residual (Eisenstat and Walker 1996); then it is
 //! halved until the residual, or its work on the correction, has fallen.
+use super::held::{Held, Wall};
 use super::multigrid::Multigrid;
 use super::points::{Points, Sweep};
-use super::unknowns::{Held, Nodal, Unknowns};
-use super::walls::Wall;
+use super::unknowns::{Nodal, Unknowns};
 use crate::kernel::{Row, Scheme};
 use crate::solver::state::{Effort, Solver};
 use crate::solver::step::p2g::scatter;

@@ -6,7 +6,7 @@
 use partition::MAX_LEVEL;
 use partition::comm::Comm;
 
-use super::walls::{Wall, dot, without};
+use super::held::{Along, Held, Holder, Wall, dot, without};
 use crate::boundary::Contact;
 use crate::boundary::motion::Rate;
 use crate::exact_sum::ExactSum;
@@ -32,25 +32,6 @@ const SLIVER: f64 = 1e-4;
 /// No unknown.
 const NONE: u32 = u32::MAX;
 
-/// What prescribes the displacement of a node along an axis.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Holder {
-    /// A load that prescribes velocities, by its number.
-    Grip(usize),
-    /// A collider, by its number.
-    Collider(usize),
-    /// A face of the domain: `2 axis` for the lower, one more for the upper.
-    Face(usize),
-}
-
-/// A prescribed displacement along an axis.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Held {
-    pub(super) by: Holder,
-    /// Displacement in the step, m.
-    pub(super) way: f64,
-}
-
 /// The nodes of a load step.
 pub(super) struct Unknowns<const D: usize> {
     /// Rows of the nodes.
@@ -65,7 +46,7 @@ pub(super) struct Unknowns<const D: usize> {
     pub(super) held: Vec<[Option<Held>; D]>,
     /// Nodes with displacements that are prescribed along other directions, in the order of their numbers:
     /// unit vectors at right angles to each other and to what is held along axes.
-    pub(super) turned: Vec<(usize, Vec<([f64; D], Held)>)>,
+    pub(super) turned: Vec<(usize, Vec<Along<D>>)>,
     /// Tied nodes with their corners, by number.
     ties: Vec<(usize, Vec<(usize, f64)>)>,
     /// Masses of the nodes, kg.
@@ -171,7 +152,7 @@ impl<const D: usize> Unknowns<D> {
     }
 
     /// Conditions of a node that are not along axes.
-    fn turned_at(&self, node: usize) -> Option<&[([f64; D], Held)]> {
+    fn turned_at(&self, node: usize) -> Option<&[Along<D>]> {
         let found = self.turned.binary_search_by_key(&node, |(node, _)| *node).ok()?;
         Some(&self.turned[found].1)
     }

@@ -12,131 +12,17 @@
 //! of displacements and forces by projection.
 use partition::comm::Comm;
 
-use super::unknowns::{Held, Holder, Nodal, Unknowns};
+use super::held::{Along, Held, Holder, Next, State, Wall, axis, dot, without};
+use super::unknowns::{Nodal, Unknowns};
 
 /// Displacement, in cells, below which a node is where it should be.
 const SAME: f64 = 1e-9;
 /// Part of a unit vector beside those that hold a node already from which it is another condition.
 const OTHER: f64 = 0.05;
 
-/// What a wall does at a node.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum State {
-    /// Nothing: the node has left.
-    Away,
-    /// It holds the node along its normal.
-    Slides,
-    /// It holds the node in all directions.
-    Sticks,
-}
-
-/// A wall at a node.
-#[derive(Clone, Debug)]
-pub(super) struct Wall<const D: usize> {
-    /// Number of the node.
-    pub(super) node: usize,
-    pub(super) by: Holder,
-    /// Unit normal, to the material.
-    pub(super) normal: [f64; D],
-    /// Displacement of the wall in the step, m.
-    pub(super) way: [f64; D],
-    /// Coefficient of friction.
-    pub(super) friction: f64,
-    /// Whether the node may leave.
-    pub(super) separates: bool,
-    pub(super) state: State,
-    /// The direction that it alone holds: its normal without what else holds the node; 0 where that is all.
-    pub(super) along: [f64; D],
-    /// Friction on a node that slides, N.
-    pub(super) push: [f64; D],
-}
-
-impl<const D: usize> Wall<D> {
-    /// A wall at a node, with which a step begins.
-    pub(super) fn new(
-        (node, by): (usize, Holder),
-        normal: [f64; D],
-        way: [f64; D],
-        (friction, separates): (f64, bool),
-    ) -> Self {
-        let state = if friction > 0.0 { State::Sticks } else { State::Slides };
-        Self { node, by, normal, way, friction, separates, state, along: [0.0; D], push: [0.0; D] }
-    }
-
-    /// What a node with this displacement (m) and this force that the wall has to bear (N) should do;
-    /// displacements up to `near` (m) and forces up to `slack` (N) count as none. `free` takes out of a vector
-    /// what else holds the node. A node goes from sticking to leaving and back over sliding: what sticks may
-    /// pull though what slides presses.
-    fn next(
-        &self,
-        way: &[f64; D],
-        rest: &[f64; D],
-        (near, slack): (f64, f64),
-        free: impl Fn([f64; D]) -> [f64; D],
-    ) -> Next<D> {
-        let off: [f64; D] = std::array::from_fn(|a| way[a] - self.way[a]);
-        let stays = Next { state: self.state, push: self.push, excess: 0.0 };
-        let slides = |push: [f64; D], excess: f64| Next { state: State::Slides, push, excess };
-        if self.state == State::Away {
-            let into = -dot(&off, &self.normal);
-            return if into > near { slides([0.0; D], slack / near * into) } else { stays };
-        }
-        let share = dot(&self.normal, &self.along);
-        if share <= 0.0 {
-            return stays;
-        }
-        let pressure = -dot(rest, &self.along) / share;
-        let is_pulled = self.separates && pressure < -slack;
-        let most = self.friction * pressure.max(0.0);
-        let tangential = |v: [f64; D]| without(&free(v), &self.along);
-        let size_of = |v: &[f64; D]| dot(v, v).sqrt();
-        match self.state {
-            State::Sticks => {
-                let needed = tangential(rest.map(|force| -force));
-                let size = size_of(&needed);
-                let push = if size > 0.0 { needed.map(|force| most / size * force) } else { needed };
-                let is_held = !is_pulled && size <= most + slack;
-                if is_held { stays } else { slides(push, (size - most).max(-pressure)) }
-            }
-            _ if is_pulled => Next { state: State::Away, push: [0.0; D], excess: -pressure },
-            _ if self.friction > 0.0 => {
-                let slip = tangential(off);
-                let (size, bears) = (size_of(&slip), size_of(&self.push));
-                let along = dot(&slip, &self.push);
-                if size > near && along > 0.0 {
-                    return Next {
-                        state: State::Sticks,
-                        push: [0.0; D],
-                        excess: slack / near * along / bears,
-                    };
-                }
-                let push = if size > near {
-                    slip.map(|slip| -most / size * slip)
-                } else if bears > 0.0 {
-                    self.push.map(|force| most / bears * force)
-                } else {
-                    self.push
-                };
-                Next { push, ..stays }
-            }
-            _ => stays,
-        }
-    }
-}
-
-/// What a node should do.
-#[derive(Clone, Copy, Debug)]
-struct Next<const D: usize> {
-    state: State,
-    /// Friction, N.
-    push: [f64; D],
-    /// Force by which the present state is wrong, N.
-    excess: f64,
-}
-
 /// Conditions of a node, at right angles to each other.
 struct Frame<const D: usize> {
-    along: Vec<([f64; D], Held)>,
+    along: Vec<Along<D>>,
 }
 
 impl<const D: usize> Frame<D> {
@@ -170,7 +56,7 @@ impl<const D: usize> Frame<D> {
     }
 
     /// Conditions along axes, and the others; those along axes in `fixed` stay as they are.
-    fn split(self, fixed: &[Option<Held>; D]) -> ([Option<Held>; D], Vec<([f64; D], Held)>) {
+    fn split(self, fixed: &[Option<Held>; D]) -> ([Option<Held>; D], Vec<Along<D>>) {
         let mut held = *fixed;
         if self.along.len() == D {
             let all = |a: usize| self.along.iter().fold(0.0, |sum, (e, own)| e[a].mul_add(own.way, sum));
@@ -288,21 +174,6 @@ impl<const D: usize> Unknowns<D> {
     }
 }
 
-/// Unit vector along an axis.
-fn axis<const D: usize>(a: usize) -> [f64; D] {
-    std::array::from_fn(|b| if a == b { 1.0 } else { 0.0 })
-}
-
-pub(super) fn dot<const D: usize>(a: &[f64; D], b: &[f64; D]) -> f64 {
-    (0..D).fold(0.0, |sum, k| a[k].mul_add(b[k], sum))
-}
-
-/// A vector without its part along a unit vector.
-pub(super) fn without<const D: usize>(v: &[f64; D], along: &[f64; D]) -> [f64; D] {
-    let part = dot(v, along);
-    std::array::from_fn(|a| (-part).mul_add(along[a], v[a]))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -334,28 +205,5 @@ mod tests {
         let (held, turned) = frame.split(&fixed);
         // Along 0.6 x - 0.8 y the wall moves by -0.8, and x is fixed.
         assert!(turned.is_empty() && held[1].is_some_and(|held| (held.way - 1.0).abs() < 1e-14), "{held:?}");
-    }
-
-    /// What a node at a wall below with this displacement does that bears this force.
-    fn next(state: State, way: [f64; 2], rest: [f64; 2]) -> (State, [f64; 2]) {
-        let mut wall = Wall::new((0, WALL), [0.0, 1.0], [0.0; 2], (0.5, true));
-        (wall.state, wall.along, wall.push) = (state, [0.0, 1.0], [1.0, 0.0]);
-        let next = wall.next(&way, &rest, (1e-9, 1e-9), |v| v);
-        assert!(next.excess > 0.0 || next.state == state, "{next:?}");
-        (next.state, next.push)
-    }
-
-    #[test]
-    fn nodes_leave_stick_and_slide_as_they_should() {
-        assert_eq!(next(State::Sticks, [0.0; 2], [4.9, -10.0]).0, State::Sticks);
-        assert_eq!(next(State::Sticks, [0.0; 2], [8.0, -10.0]), (State::Slides, [-5.0, 0.0]));
-        // Against its slip, under the present force; it sticks where friction would drive it.
-        assert_eq!(next(State::Slides, [-0.1, 0.0], [0.0, -4.0]), (State::Slides, [2.0, 0.0]));
-        assert_eq!(next(State::Slides, [0.1, 0.0], [0.0, -4.0]).0, State::Sticks);
-        // What is pulled slides before it leaves.
-        assert_eq!(next(State::Sticks, [0.0; 2], [0.0, 1.0]).0, State::Slides);
-        assert_eq!(next(State::Slides, [0.0; 2], [0.0, 1.0]).0, State::Away);
-        assert_eq!(next(State::Away, [0.0, 0.1], [0.0; 2]).0, State::Away);
-        assert_eq!(next(State::Away, [0.0, -0.1], [0.0; 2]), (State::Slides, [0.0; 2]));
     }
 }
