@@ -8,7 +8,7 @@ use crate::common::launch::{run, succeed, text};
 use crate::common::restart;
 
 /// Factors of the report of a run: with equilibrium, and without.
-fn factors(directory: &Path, name: &str) -> [Option<f64>; 2] {
+pub(crate) fn factors(directory: &Path, name: &str) -> [Option<f64>; 2] {
     let path = directory.join("out").join(name).join(format!("{name}.report.json"));
     let report = std::fs::read_to_string(path).expect("a report");
     let report: serde_json::Value = serde_json::from_str(&report).expect("JSON");

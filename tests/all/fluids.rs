@@ -115,7 +115,7 @@ impl Slosh {
 /// Height of the centre of mass of still water of this undeformed depth (m) and bulk modulus (Pa): at the
 /// height Y of undeformed water the pressure is the weight above, `p = ρ g (H - Y)`, and a layer has
 /// `dy/dY = (1 + γ p/K)^(-1/γ)` of its thickness.
-fn still(depth: f64, modulus: f64) -> f64 {
+pub(crate) fn still(depth: f64, modulus: f64) -> f64 {
     let layer = depth / 1000.0;
     let (mut height, mut moment) = (0.0, 0.0);
     for i in 0..1000 {

@@ -4,6 +4,7 @@
 use crate::common::history::History;
 use crate::common::launch::{run, succeed};
 use crate::common::restart;
+use crate::factor_of_safety::factors;
 
 /// A stiff column of 5 m between slip faces, with a weight of 16, saturated 20 kN/m³, and K0 = 0.5, on cells of 1/8 m.
 fn column(level: f64) -> String {
@@ -89,10 +90,7 @@ fn factor(density: f64, water: &str) -> f64 {
     let path = directory.path().join("slope.toml");
     std::fs::write(&path, changed).expect("job");
     succeed(&mut run(directory.path(), 1, 1, &path, &["--quiet"]));
-    let report =
-        std::fs::read_to_string(directory.path().join("out/slope/slope.report.json")).expect("a report");
-    let report: serde_json::Value = serde_json::from_str(&report).expect("JSON");
-    report["factor_of_safety"]["stands"].as_f64().expect("a factor")
+    factors(directory.path(), "slope")[0].expect("a factor")
 }
 
 #[test]

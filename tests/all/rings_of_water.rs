@@ -4,6 +4,7 @@ use std::f64::consts::{PI, TAU};
 
 use crate::common::history::History;
 use crate::common::restart;
+use crate::fluids::still;
 
 fn history(name: &str, text: &str) -> History {
     History::of_job(name, text, &[])
@@ -197,19 +198,6 @@ fn a_rate_is_that_of_the_whole_circumference() {
     assert_eq!(history.last("mass"), history.last("fed_tap"));
     // What has left the source falls, and splashes: momentum along the radius is not kept.
     assert!(history.last("momentum_y") < 0.0);
-}
-
-/// Height of the centre of mass of still water of this undeformed depth (m): see the test of fluids in the plane.
-fn still(depth: f64, modulus: f64) -> f64 {
-    let layer = depth / 1000.0;
-    let (mut height, mut moment) = (0.0, 0.0);
-    for i in 0..1000 {
-        let pressure = 9810.0 * (depth - (f64::from(i) + 0.5) * layer);
-        let thickness = layer * (1.0 + 7.0 * pressure / modulus).powf(-1.0 / 7.0);
-        moment += (height + 0.5 * thickness) * layer;
-        height += thickness;
-    }
-    moment / depth
 }
 
 /// Water in a tank, compressed as it is under its weight, stays so, on cells of two sizes.
