@@ -45,7 +45,8 @@ impl<const D: usize> Solver<D> {
         self.grid.solids = all;
     }
 
-    /// `Σ w F` and `Σ w A` over these nodes at the copies of particles, leaf by leaf.
+    /// `Σ w F` and `Σ w A` over these nodes at the copies of particles, leaf by leaf. The sums at the nodes stay:
+    /// faces and colliders read them next.
     fn at_particles<'a>(
         &mut self,
         solids: &mut Solids<D>,
@@ -53,12 +54,14 @@ impl<const D: usize> Solver<D> {
     ) -> Vec<Vec<[f64; 2]>> {
         self.grid.swap(&mut solids.field);
         std::mem::swap(&mut self.chunks, &mut solids.copies);
+        let kept = self.grid.fields.rows.to_vec();
         self.grid.fields.rows.fill(Row::default());
         for at in forces {
             self.grid.fields.rows[at.node] = Row([at.force, at.area, 0.0, 0.0]);
         }
         self.prolong();
         let sums = self.interpolate();
+        self.grid.fields.rows.copy_from_slice(&kept);
         std::mem::swap(&mut self.chunks, &mut solids.copies);
         self.grid.swap(&mut solids.field);
         sums.into_iter().map(|leaf| leaf.into_iter().map(|sums| [sums[0], sums[1]]).collect()).collect()
