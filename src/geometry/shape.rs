@@ -68,6 +68,17 @@ pub enum Shape<const D: usize> {
 }
 
 impl<const D: usize> Shape<D> {
+    /// Whether a part of it has a curved surface: analytic shapes only.
+    pub fn is_curved(&self) -> bool {
+        match self {
+            Self::Box(_) | Self::HalfSpace { .. } | Self::Polygon(_) | Self::Mesh(_) => false,
+            Self::Sphere { .. } | Self::Frustum(_) => true,
+            Self::Rotated(shape, _) => shape.is_curved(),
+            Self::Union(parts) | Self::Intersection(parts) => parts.iter().any(Self::is_curved),
+            Self::Difference(from, removed) => from.is_curved() || removed.iter().any(Self::is_curved),
+        }
+    }
+
     /// Signed distance to the surface, m, negative inside; a bound for booleans (see the module).
     pub fn distance(&self, x: &[f64; D]) -> f64 {
         match self {

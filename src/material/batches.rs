@@ -96,6 +96,12 @@ pub trait Material: std::fmt::Debug + Send + Sync {
     fn is_plastic(&self) -> bool {
         self.history_names().len() > PLASTIC_STRAIN
     }
+
+    /// Whether a body keeps its shape until it yields under its loads: elastic material, metals and clay, not
+    /// what flows or breaks.
+    fn keeps_its_shape(&self) -> bool {
+        !self.is_fluid() && (!self.is_plastic() || self.is_firm())
+    }
 }
 
 impl<L: Law> Material for L {

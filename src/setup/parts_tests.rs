@@ -166,3 +166,41 @@ fn rounding_of_faces_does_not_matter() {
     assert_eq!(make(1.5_f64.next_up()), exact);
     assert_eq!(make(1.5 - 1e-12), exact);
 }
+
+/// Which of these bodies are fitted without a word: shapes and materials ("rubber", "steel" or "sand") in a domain
+/// of 4 by 2 m.
+fn fitted(bodies: &[(&str, &str)]) -> Vec<bool> {
+    let bodies: String = (bodies.iter().enumerate())
+        .map(|(i, (material, shape))| {
+            format!("[[bodies]]\nname = \"{i}\"\nmaterial = \"{material}\"\nshape = {shape}\n")
+        })
+        .collect();
+    let elastic = "density = 1000\nyoung = 1e6\npoisson = 0.3\n";
+    let text = format!(
+        "version = 1\ndimension = 2\ntime = {{ end = 1 }}\ndomain = {{ size = [4, 2], root_edge = 1 }}\n\
+         [[materials]]\nname = \"rubber\"\nmodel = \"hencky\"\n{elastic}\
+         [[materials]]\nname = \"steel\"\nmodel = \"von_mises\"\nyield_stress = 1e4\n{elastic}\
+         [[materials]]\nname = \"sand\"\nmodel = \"drucker_prager\"\nfriction_angle = 30\n{elastic}{bodies}"
+    );
+    let any = parse(&text, "test.toml".as_ref()).unwrap_or_else(|faults| panic!("{faults:?}"));
+    let problem: Problem<2> = any.try_into().unwrap_or_else(|_| panic!("wrong dimension"));
+    problem.bodies.iter().map(|body| matches!(body.sampling, Sampling::Fitted)).collect()
+}
+
+#[test]
+fn curved_solids_and_what_touches_them_are_fitted_without_a_word() {
+    let disc = r#"{ kind = "circle", centre = [0.5, 0.5], radius = 0.4 }"#;
+    let far = r#"{ kind = "circle", centre = [3, 0.5], radius = 0.4 }"#;
+    let floor = r#"{ kind = "box", min = [0, 0], max = [1, 0.1] }"#;
+    let bed = r#"{ kind = "box", min = [2, 0], max = [4, 0.1] }"#;
+    assert_eq!(fitted(&[("rubber", disc)]), [true]);
+    assert_eq!(fitted(&[("steel", disc)]), [true]);
+    assert_eq!(fitted(&[("sand", disc)]), [false]);
+    assert_eq!(fitted(&[("rubber", floor)]), [false]);
+    assert_eq!(fitted(&[("rubber", disc), ("steel", floor)]), [true, true]);
+    // The parts of a disc and the whole boxes of sand would overlap.
+    assert_eq!(
+        fitted(&[("sand", bed), ("rubber", far), ("rubber", disc), ("rubber", floor)]),
+        [false, false, true, true]
+    );
+}

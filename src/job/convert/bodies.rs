@@ -35,7 +35,39 @@ pub(super) fn bodies<const D: usize>(
         })
         .flatten()
         .collect();
-    (bodies.len() == file.bodies.len()).then_some(bodies)
+    (bodies.len() == file.bodies.len()).then(|| fit_curved(bodies, file, space))
+}
+
+/// Without a word, bodies that keep their shape are fitted to it if they or any that they touch, directly or
+/// through others, are curved: particles of what flows leave their places anyway. Bodies that touch one on the lattice
+/// stay there, since the parts of one and the whole boxes of the other would overlap.
+fn fit_curved<const D: usize>(mut bodies: Vec<Body<D>>, file: &JobFile, space: &Space<D>) -> Vec<Body<D>> {
+    let slack = 1e-9 * space.size.iter().fold(0.0, |most: f64, &size| most.max(size));
+    let bounds: Vec<Aabb<D>> = bodies.iter().map(|body| body.shape.bounds().grown(slack)).collect();
+    let can_be = |number: usize| match file.bodies[number].sampling {
+        Some(sampling) => sampling == file::Sampling::Fitted,
+        None => {
+            let material = material_setup(&file.materials[bodies[number].material]).build();
+            material.keeps_its_shape() && bodies[number].given.is_none()
+        }
+    };
+    let can_be: Vec<bool> = (0..bodies.len()).map(can_be).collect();
+    let mut is_seen = vec![false; bodies.len()];
+    for first in 0..bodies.len() {
+        let (mut group, mut next) = (Vec::new(), vec![first]);
+        while let Some(number) = next.pop() {
+            if !std::mem::replace(&mut is_seen[number], true) {
+                group.push(number);
+                let touches = |other: &usize| !bounds[number].intersection(&bounds[*other]).is_empty();
+                next.extend((0..bodies.len()).filter(|other| !is_seen[*other]).filter(touches));
+            }
+        }
+        let is_curved = group.iter().any(|&number| bodies[number].shape.is_curved());
+        if is_curved && group.iter().all(|&number| can_be[number]) {
+            group.iter().for_each(|&number| bodies[number].sampling = Sampling::Fitted);
+        }
+    }
+    bodies
 }
 
 pub(super) fn body<const D: usize>(

@@ -277,7 +277,8 @@ pub struct Body {
     #[serde(default = "two")]
     #[schemars(range(min = 0.5, max = 8.0))]
     pub particles_per_cell: f64,
-    /// How particles lie: on the lattice by default.
+    /// How particles lie. By default on the lattice; `fitted` for balls, cylinders, cones and what is made of them, of elastic material, metal
+    /// and clay.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sampling: Option<Sampling>,
     /// Number that chooses one of many arrangements of `jittered` and `poisson`; 0 by default. Runs that differ in it alone show by how

@@ -94,10 +94,11 @@ fn over_a_disc() {
     on_ranks(module_path!(), "over_a_disc", &[1], |comm| sweeps::<2>(comm, body, 130, 1000, 5e-3));
 }
 
-/// A spinning ball that drifts with this velocity.
+/// A spinning ball that drifts with this velocity, on the lattice: a fitted one loses 1.1 % of its energy in 40
+/// passes, and this one 1 %.
 fn ball(velocity: [f64; 3]) -> String {
     format!(
-        "particles_per_cell = 1\nshape = {{ kind = 'sphere', centre = [0.9, 0.95, 1.03], radius = 0.3 }}\n\
+        "particles_per_cell = 1\nsampling = 'lattice'\nshape = {{ kind = 'sphere', centre = [0.9, 0.95, 1.03], radius = 0.3 }}\n\
          velocity = {velocity:?}\nangular_velocity = [2, -3, 5]"
     )
 }
