@@ -2,10 +2,10 @@
 //! weight, a notched bar, a sphere under inner pressure.
 
 use crate::common::history::History;
+use crate::common::load_steps::load_steps;
 
 /// A block of 1 m, fixed below, half of it; probes measure the mean of four particles round a point.
 const BLOCK: &str = r#"
-version = 1
 dimension = 2
 gravity = [0, -10]
 [domain]
@@ -36,20 +36,12 @@ shape = { kind = "box", min = [0.22, 0.47], max = [0.28, 0.53] }
 name = "low"
 quantities = ["centre"]
 shape = { kind = "box", min = [0.22, 0.22], max = [0.28, 0.28] }
-[quasi_static]
-step = 1
-[time]
-end = 1
-[output]
-picture = false
-[history]
-every_steps = 1
 "#;
 
 /// Finite elements with 9 nodes, in ρ g H² / E. The difference is that to the greatest displacement, 0.447.
 #[test]
 fn a_block_under_its_weight_is_that_of_finite_elements() {
-    let found = History::of_job("block", BLOCK, &[]);
+    let found = History::of_job("block", &load_steps(BLOCK, "step = 1"), &[]);
     let moved = |column: &str| {
         let values = found.column(column);
         (values[values.len() - 1] - values[0]) / 0.002
@@ -66,7 +58,6 @@ fn a_block_under_its_weight_is_that_of_finite_elements() {
 /// A bar with a round notch, a quarter of it, pulled beyond yield: 16 cells across half of the ligament. It
 /// is stiff, as the finite elements are for small strains.
 const BAR: &str = r#"
-version = 1
 dimension = 2
 [domain]
 size = [1.25, 2.25]
@@ -96,15 +87,6 @@ y = 0.0012
 shape = { kind = "box", min = [0, 1.95], max = [1.25, 2.25] }
 [numerics]
 f_bar = true
-[quasi_static]
-step = 0.125
-tolerance = 1e-4
-[time]
-end = 1
-[output]
-picture = false
-[history]
-every_steps = 1
 "#;
 
 /// Forces of finite elements with 8 nodes at 0.4, 0.8 and 1.2 mm. The last in plane strain is 1.0004 of
@@ -113,7 +95,7 @@ every_steps = 1
 fn a_notched_bar_bears_what_finite_elements_say() {
     let revolution = BAR.replace("dimension = 2", "dimension = 2\ngeometry = \"axisymmetric\"");
     for (job, last) in [(BAR.to_owned(), 1600.1), (revolution, 2168.6)] {
-        let found = History::of_job("bar", &job, &[]);
+        let found = History::of_job("bar", &load_steps(&job, "step = 0.125\ntolerance = 1e-4"), &[]);
         let force = found.column("load_pull_y").last().expect("rows");
         println!("{force} of {last}: {:+.2} %", 100.0 * (force / last - 1.0));
         assert!((force / last - 1.0).abs() < 0.02, "{force} of {last}");
@@ -124,7 +106,6 @@ fn a_notched_bar_bears_what_finite_elements_say() {
 
 /// A thick sphere under inner pressure, 16 cells through its wall.
 const SPHERE: &str = r#"
-version = 1
 dimension = 2
 geometry = "axisymmetric"
 [domain]
@@ -151,21 +132,12 @@ pressure = [[0, 0], [1, 25.2e3]]
 shape = { kind = "circle", centre = [0, 0], radius = 1.2 }
 [numerics]
 f_bar = true
-[quasi_static]
-step = 0.1
-tolerance = 1e-4
-[time]
-end = 1
-[output]
-picture = false
-[history]
-every_steps = 1
 "#;
 
 /// Hill (1950). The displacement of the inner wall is from the work of the pressure over half of the sphere.
 #[test]
 fn a_sphere_under_inner_pressure_yields_as_the_closed_form_says() {
-    let found = History::of_job("sphere", SPHERE, &[]);
+    let found = History::of_job("sphere", &load_steps(SPHERE, "step = 0.1\ntolerance = 1e-4"), &[]);
     let (times, works) = (found.column("time"), found.column("work_inside"));
     let (mut way, mut before) = (0.0, 0.0);
     for (time, work) in times.iter().zip(works).skip(1) {
@@ -199,7 +171,6 @@ fn a_sphere_under_inner_pressure_yields_as_the_closed_form_says() {
 
 /// A block pressed by a fiftieth in one step.
 const PRESSED: &str = r#"
-version = 1
 dimension = 2
 [domain]
 size = [4, 4]
@@ -222,15 +193,6 @@ name = "plate"
 kind = "velocity"
 y = -0.04
 shape = { kind = "box", min = [0, 1.9], max = [4, 2.6] }
-[quasi_static]
-step = 1
-tolerance = TOLERANCE
-[time]
-end = 1
-[output]
-picture = false
-[history]
-every_steps = 1
 "#;
 
 /// Each iteration doubles the digits once linear systems are solved to a tight tolerance: from 1e-3 two
@@ -246,7 +208,8 @@ fn newton_converges_quadratically() {
         let steps: Vec<[f64; 2]> = ["1e-3", "1e-5", "1e-7", "1e-11"]
             .iter()
             .map(|tolerance| {
-                let job = PRESSED.replace("LAW", law).replace("TOLERANCE", tolerance);
+                let keys = format!("step = 1\ntolerance = {tolerance}");
+                let job = load_steps(&PRESSED.replace("LAW", law), &keys);
                 let found = History::of_job("pressed", &job, &[]);
                 ["newton_iterations", "unbalanced_force"]
                     .map(|name| *found.column(name).last().expect("rows"))

@@ -5,6 +5,7 @@ use std::path::Path;
 
 use crate::common::history::History;
 use crate::common::launch::{run, text};
+use crate::common::load_steps::{CHECKPOINTS, load_steps};
 use crate::common::restart;
 
 /// A block of 1 m between a floor and a plate that presses it by 2 mm, all turned about (1, 1) by an angle.
@@ -14,9 +15,8 @@ fn press(degrees: f64, contact: &str) -> String {
     let below = [1.0 + 0.5 * sine, 1.0 - 0.5 * cosine];
     let above = [1.0 - 0.5 * sine, 1.0 + 0.5 * cosine];
     let way = [0.002 * sine, -0.002 * cosine];
-    format!(
+    let job = format!(
         r#"
-version = 1
 dimension = 2
 [domain]
 size = [2, 2]
@@ -57,20 +57,13 @@ kind = "velocity"
 x = {:?}
 y = {:?}
 shape = {{ kind = "box", min = [0.99, 0.99], max = [1.01, 1.01] }}
-[quasi_static]
-step = 1
-[time]
-end = 1
-[output]
-picture = false
-[history]
-every_steps = 1
 "#,
         -sine,
         -cosine,
         0.5 * way[0],
         0.5 * way[1]
-    )
+    );
+    load_steps(&job, "step = 1")
 }
 
 /// Forces of the plate on the block along its normal and across it, N.
@@ -104,9 +97,8 @@ fn smooth_plates_of_any_direction_press_as_theory_says() {
 
 /// An elastic block of 500 kg on the lower face.
 fn on_floor(gravity: &str, floor: &str, loads: &str) -> String {
-    format!(
+    let job = format!(
         r#"
-version = 1
 dimension = 2
 gravity = {gravity}
 [domain]
@@ -130,17 +122,9 @@ name = "block"
 material = "rubber"
 shape = {{ kind = "box", min = [0.5, 0], max = [1.5, 0.5] }}
 {loads}
-[quasi_static]
-step = 0.25
-[time]
-end = 1
-[output]
-picture = false
-[history]
-every_steps = 1
-face_forces = true
 "#
-    )
+    );
+    load_steps(&job, "step = 0.25") + "face_forces = true\n"
 }
 
 #[test]
@@ -190,7 +174,6 @@ fn walls_in_load_steps_give_the_same_on_any_ranks_and_across_restart() {
     let (sine, cosine) = 20.0_f64.to_radians().sin_cos();
     let job = format!(
         r#"
-version = 1
 dimension = 2
 gravity = [0, -10]
 [domain]
@@ -234,23 +217,12 @@ kind = "velocity"
 x = 0
 y = 0
 shape = {{ kind = "box", min = [0.99, 0.95], max = [1.01, 1.02] }}
-[quasi_static]
-step = 0.25
-tolerance = 1e-5
-[time]
-end = 1
-[output]
-picture = false
-[history]
-every_steps = 1
-[checkpoint]
-every_steps = 1
-keep = 99
 "#,
         -sine,
         0.005f64.mul_add(sine, 0.002 * cosine),
         0.002f64.mul_add(sine, -0.005 * cosine),
     );
+    let job = load_steps(&job, "step = 0.25\ntolerance = 1e-5") + CHECKPOINTS;
     restart::assert_same_on_any_ranks(&job, "walls", |directory: &Path, _| {
         let found = History::read(directory, "walls");
         let rest = found.column("unbalanced_force");

@@ -3,14 +3,14 @@
 
 use crate::common::history::History;
 use crate::common::launch::{run, succeed};
+use crate::common::load_steps::{CHECKPOINTS, load_steps};
 use crate::common::restart;
 use crate::factor_of_safety::factors;
 
 /// A stiff column of 5 m between slip faces, with a weight of 16, saturated 20 kN/m³, and K0 = 0.5, on cells of 1/8 m.
 fn column(level: f64) -> String {
-    format!(
+    let job = format!(
         r#"
-version = 1
 dimension = 2
 gravity = [0, -9.81]
 [domain]
@@ -43,18 +43,9 @@ quantities = ["stress", "pore_pressure"]
 name = "middle"
 point = [0.4, 2.55]
 quantities = ["stress", "pore_pressure"]
-[quasi_static]
-step = 1
-tolerance = 1e-8
-[time]
-end = 1
-[output]
-picture = false
-[history]
-every_steps = 1
-face_forces = true
 "#
-    )
+    );
+    load_steps(&job, "step = 1\ntolerance = 1e-8") + "face_forces = true\n"
 }
 
 /// Saturated to the surface, under 2 m of water, and with the table 2 m down. Particles have the stress of the
@@ -106,7 +97,6 @@ fn a_slope_under_water_is_as_safe_as_with_its_buoyant_weight() {
 #[test]
 fn water_in_load_steps_gives_the_same_on_any_ranks_and_across_restart() {
     let job = r#"
-version = 1
 dimension = 2
 gravity = [0, -10]
 [domain]
@@ -148,20 +138,9 @@ material = "sand"
 shape = { kind = "polygon", points = [[0, 0.25], [2, 0.25], [1.1, 0.6], [0, 0.6]] }
 [numerics]
 f_bar = true
-[quasi_static]
-step = 0.25
-tolerance = 1e-4
-[time]
-end = 1
-[output]
-picture = false
-[history]
-every_steps = 1
-[checkpoint]
-every_steps = 1
-keep = 99
 "#;
-    restart::assert_same_on_any_ranks(job, "water", |directory, _| {
+    let job = load_steps(job, "step = 0.25\ntolerance = 1e-4") + CHECKPOINTS;
+    restart::assert_same_on_any_ranks(&job, "water", |directory, _| {
         let rest = History::read(directory, "water");
         assert!(rest.column("unbalanced_force").iter().all(|rest| *rest <= 1e-4));
     });

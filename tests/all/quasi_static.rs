@@ -2,11 +2,11 @@
 //! level and of several, with the same bits on any ranks and across restarts.
 
 use crate::common::history::History;
+use crate::common::load_steps::{CHECKPOINTS, load_steps};
 use crate::common::restart;
 
 /// A soft column under its weight, 50 m high (Charlton, Coombs and Augarde 2017).
 const COLUMN: &str = r#"
-version = 1
 dimension = 2
 gravity = [0, [[0, 0], [1, -10]]]
 [domain]
@@ -31,15 +31,6 @@ shape = { kind = "box", min = [0, 0], max = [4, 50] }
 name = "top"
 point = [0.25, 49.75]
 quantities = ["centre"]
-[quasi_static]
-step = 0.25
-[time]
-end = 1
-[output]
-picture = false
-[history]
-every_steps = 1
-face_forces = true
 "#;
 
 /// With ν = 0 the column keeps its width, so `E ln λ = λ σ` and `σ = -ρ g (H - Y)`.
@@ -52,7 +43,8 @@ fn a_column_under_its_weight_is_as_high_as_theory_says() {
     let (parts, top) = (1000, 49.75);
     let part = top / f64::from(parts);
     let height: f64 = (0..parts).map(|i| part * stretch(50.0 - part * (f64::from(i) + 0.5))).sum();
-    let found = History::of_job("column", COLUMN, &[]);
+    let job = load_steps(COLUMN, "step = 0.25") + "face_forces = true";
+    let found = History::of_job("column", &job, &[]);
     let error = found.last("centre_top_y") / height - 1.0;
     let force = found.last("force_y_min_y");
     println!("height {error:+.1e}, force {force:.1} N");
@@ -64,7 +56,6 @@ fn a_column_under_its_weight_is_as_high_as_theory_says() {
 
 /// An elastic slope under its weight, on cells of 1/32 m and, in finer regions, of 1/64 and 1/128 m.
 const SLOPE: &str = r#"
-version = 1
 dimension = 2
 gravity = [0, -9.81]
 [domain]
@@ -89,14 +80,6 @@ shape = { kind = "polygon", points = [[0, 0], [0.93, 0], [0.93, 0.289], [0.35, 0
 name = "crest"
 quantities = ["centre"]
 shape = { kind = "box", min = [0, 0.4], max = [0.3, 0.6] }
-[quasi_static]
-step = 1
-[time]
-end = 1
-[output]
-picture = false
-[history]
-every_steps = 1
 "#;
 
 /// Finer cells at the crest, two and three times as fine as around.
@@ -105,7 +88,7 @@ const FINE: &str = "tree.regions=[{ level = 4, shape = { kind = 'box', min = [0.
 /// Linear iterations of the one step, over all its linear systems.
 fn iterations(set: &[&str]) -> f64 {
     let arguments: Vec<&str> = set.iter().flat_map(|set| ["--set", set]).collect();
-    let found = History::of_job("slope", SLOPE, &arguments);
+    let found = History::of_job("slope", &load_steps(SLOPE, "step = 1"), &arguments);
     let [newton, linear] = ["newton_iterations", "linear_iterations"].map(|name| found.last(name));
     assert!(newton <= 3.0, "{set:?}: {newton}");
     linear
@@ -129,7 +112,6 @@ fn nearly_incompressible_slopes_take_at_most_twice_as_many() {
 
 /// A block between plates that keep its sides free, far beyond yield in plane strain: `|σ| = 2 Y / √3`.
 const BLOCK: &str = r#"
-version = 1
 dimension = 2
 [domain]
 size = [4, 4]
@@ -153,19 +135,11 @@ name = "plate"
 kind = "velocity"
 y = -0.04
 shape = { kind = "box", min = [0, 1.9], max = [4, 2.6] }
-[quasi_static]
-step = 0.25
-[time]
-end = 1
-[output]
-picture = false
-[history]
-every_steps = 1
 "#;
 
 #[test]
 fn a_block_beyond_yield_bears_what_plane_strain_says() {
-    let found = History::of_job("block", BLOCK, &[]);
+    let found = History::of_job("block", &load_steps(BLOCK, "step = 0.25"), &[]);
     let force = found.last("load_plate_y");
     // Of its volume the block loses next to nothing.
     let width = 2.0 / (1.0 - 0.04 / 2.0);
@@ -248,7 +222,6 @@ refine = 0.02
 #[test]
 fn load_steps_in_space_give_the_same_on_any_ranks() {
     let job = r#"
-version = 1
 dimension = 3
 gravity = [0, [[0, 0], [1, -9.81]], 0]
 [domain]
@@ -276,20 +249,9 @@ parts = [
     { kind = "box", min = [0, 0, 0], max = [0.8, 0.55, 0.8] },
     { kind = "half_space", point = [0.35, 0.55, 0.35], normal = [0.45, 1, 0.45] },
 ]
-[quasi_static]
-step = 0.5
-tolerance = 1e-5
-[time]
-end = 1
-[output]
-picture = false
-[history]
-every_steps = 1
-[checkpoint]
-every_steps = 1
-keep = 99
 "#;
-    restart::assert_same_on_any_ranks(job, "space", |directory, _| {
+    let job = load_steps(job, "step = 0.5\ntolerance = 1e-5") + CHECKPOINTS;
+    restart::assert_same_on_any_ranks(&job, "space", |directory, _| {
         let history = History::read(directory, "space");
         let [rest, linear] = ["unbalanced_force", "linear_iterations"].map(|name| history.column(name));
         assert!(rest.iter().all(|rest| *rest <= 1e-5), "{rest:?}");

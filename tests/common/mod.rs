@@ -6,6 +6,7 @@
 //! | [`scenarios`], [`relaunch`] | this binary again, under `mpirun` |
 //! | [`launch`] | the program, as a user starts it |
 //! | [`runs`], [`history`], [`restart`] | results of whole runs; equality across ranks and restarts |
+//! | [`load_steps`] | jobs by load steps |
 //! | [`program`] | subcommands, a browser, a body for a job |
 //! | [`papers`] | fenced blocks of the documentation |
 //! | [`boxes`], [`exact`], [`tree`] | boxes, exact weights and trees |
@@ -16,6 +17,7 @@ pub(crate) mod damage;
 pub(crate) mod exact;
 pub(crate) mod history;
 pub(crate) mod launch;
+pub(crate) mod load_steps;
 pub(crate) mod mpirun;
 pub(crate) mod papers;
 pub(crate) mod program;

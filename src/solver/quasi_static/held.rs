@@ -1,7 +1,8 @@
-//! What holds a node in a load step: faces, grips and colliders along axes, and walls along which it slides or
-//! which it may leave.
+//! Supports of a node in a load step: faces, grips and colliders along axes, and walls along which it slides
+//! or which it may leave.
+use crate::solver::state::inside::dot;
 
-/// What prescribes the displacement of a node along an axis.
+/// Source of a prescribed displacement.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Holder {
     /// A load that prescribes velocities, by its number.
@@ -23,7 +24,7 @@ pub(super) struct Held {
 /// A unit vector, and the displacement along it.
 pub(super) type Along<const D: usize> = ([f64; D], Held);
 
-/// What a wall does at a node.
+/// Hold of a wall on a node.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum State {
     /// Nothing: the node has left.
@@ -67,9 +68,9 @@ impl<const D: usize> Wall<D> {
         Self { node, by, normal, way, friction, separates, state, along: [0.0; D], push: [0.0; D] }
     }
 
-    /// What a node with this displacement (m) and this force that the wall has to bear (N) should do;
-    /// displacements up to `near` (m) and forces up to `slack` (N) count as none. `free` takes out of a vector
-    /// what else holds the node. A node goes from sticking to leaving and back over sliding: what sticks may
+    /// The state that a node with this displacement (m) and this force that the wall has to bear (N) should
+    /// have; displacements up to `near` (m) and forces up to `slack` (N) count as none. `free` takes out of a
+    /// vector the directions that other supports hold. A node goes from sticking to leaving and back over sliding: what sticks may
     /// pull though what slides presses.
     pub(super) fn next(
         &self,
@@ -128,7 +129,7 @@ impl<const D: usize> Wall<D> {
     }
 }
 
-/// What a node should do.
+/// The state that a node should have.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Next<const D: usize> {
     pub(super) state: State,
@@ -143,10 +144,6 @@ pub(super) fn axis<const D: usize>(a: usize) -> [f64; D] {
     std::array::from_fn(|b| if a == b { 1.0 } else { 0.0 })
 }
 
-pub(super) fn dot<const D: usize>(a: &[f64; D], b: &[f64; D]) -> f64 {
-    (0..D).fold(0.0, |sum, k| a[k].mul_add(b[k], sum))
-}
-
 /// A vector without its part along a unit vector.
 pub(super) fn without<const D: usize>(v: &[f64; D], along: &[f64; D]) -> [f64; D] {
     let part = dot(v, along);
@@ -159,7 +156,7 @@ mod tests {
 
     const WALL: Holder = Holder::Collider(0);
 
-    /// What a node at a wall below with this displacement does that bears this force.
+    /// State and friction of a node at a wall below with this displacement that bears this force.
     fn next(state: State, way: [f64; 2], rest: [f64; 2]) -> (State, [f64; 2]) {
         let mut wall = Wall::new((0, WALL), [0.0, 1.0], [0.0; 2], (0.5, true));
         (wall.state, wall.along, wall.push) = (state, [0.0, 1.0], [1.0, 0.0]);

@@ -1,9 +1,9 @@
 //! Load steps: equilibrium at the end of each step, by Newton's method.
 //!
-//! In a quasi-static job all velocities are 0 between steps, and time orders loads and motions. A step finds the
-//! displacements of nodes with which forces balance at its end (updated Lagrangian; Charlton, Coombs and
-//! Augarde 2017); then particles take on what they gather from these, as in any step. A step in which
-//! the iteration fails is done again with half its length.
+//! In a quasi-static job all velocities are 0 between steps, and time orders loads and motions. A step finds
+//! the displacements of nodes with which forces balance at its end (updated Lagrangian; Charlton, Coombs and
+//! Augarde 2017); then particles take on what they gather from these, as in any step. A step in which the
+//! iteration fails is done again with half its length.
 //!
 //! | file | what it holds |
 //! |---|---|
@@ -11,29 +11,19 @@
 //! | `unknowns` | nodes, what holds them, ties, products |
 //! | `walls` | where they slide, stick or leave |
 //! | `points` | stress and tangent of the particles |
-//! | `everywhere` | nodes of all ranks |
-//! | `lattice` | cells on the lattice of the finest nodes |
-//! | `bricks` | cells as elements |
-//! | `blocks` | sparse matrices of blocks, smoother, cycle |
-//! | `skyline` | factors of a symmetric matrix |
-//! | `multigrid` | preconditioner: its levels |
+//! | `multigrid/` | preconditioner |
 //! | `newton` | the iteration |
 //! | `strength` | the search for a factor of safety |
 //! | this | a step |
-mod blocks;
-mod bricks;
-mod everywhere;
 mod held;
-mod lattice;
 mod multigrid;
 mod newton;
 mod points;
-mod skyline;
 mod strength;
 mod unknowns;
 mod walls;
 
-use self::held::{Holder, Wall, dot};
+use self::held::{Holder, Wall};
 use self::newton::MOST_WAY;
 use self::unknowns::{Nodal, Unknowns};
 use super::step::colliders::Touch;
@@ -45,6 +35,7 @@ use crate::load::{Kind, Load};
 use crate::particle::chunk::{Chunk, Layout};
 use crate::solver::migration::migrate::Moved;
 use crate::solver::state::bookings::SUMS;
+use crate::solver::state::inside::dot;
 use crate::solver::state::{Effort, Solver, StepError};
 use crate::solver::step::relax::stop;
 

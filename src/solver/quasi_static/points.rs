@@ -1,14 +1,14 @@
 //! Particles as integration points of a load step: deformation since its start, stress, and tangent.
 //!
 //! Weights are those of the start of the step, with gradients `∇w` there. With displacements u of the nodes
-//! since, a particle has `ΔF = 1 + Σ u ⊗ ∇w`, with F-bar the mean dilation of its cell, and the law gives τ from
-//! `ΔF b ΔFᵀ` and the history at the start. The forces on nodes are `-Σ V₀ P ∇w` with `P = τ ΔF⁻ᵀ`. A change
-//! `δF = Σ δu ⊗ ∇w` changes P by
+//! since, a particle has `ΔF = 1 + Σ u ⊗ ∇w`, with F-bar the mean dilation of its cell, and the law gives τ
+//! from `ΔF b ΔFᵀ` and the history at the start. The forces on nodes are `-Σ V₀ P ∇w` with `P = τ ΔF⁻ᵀ`. A
+//! change `δF = Σ δu ⊗ ∇w` changes P by
 //! ```text
 //! δP = (δτ - τ lᵀ) ΔF⁻ᵀ,   l = δF ΔF⁻¹
 //! ```
-//! with δτ by the tangent of the law. F-bar is a projection of ΔF; the same projection of P is its adjoint, so
-//! the stiffness of an elastic body is symmetric with it as well.
+//! with δτ by the tangent of the law. F-bar is a projection of ΔF; the same projection of P is its adjoint,
+//! so the stiffness of an elastic body is symmetric with it as well.
 //!
 //! While the strength is reduced, forces balance on the shape of the start: `P = τ`, and ΔF is `1 + ε` with
 //! the symmetric part ε of the gradients.
@@ -227,7 +227,8 @@ fn project<const D: usize>(
     }
 }
 
-/// The states of the particles of a leaf with these gradients of displacements. Returns whether all are sound.
+/// The states of the particles of a leaf with these gradients of displacements. Returns whether all are
+/// sound.
 fn deform<const D: usize>(
     chunk: &mut Chunk<D>,
     scheme: &Scheme<'_>,

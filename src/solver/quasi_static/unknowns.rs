@@ -2,11 +2,12 @@
 //!
 //! Each rank has all nodes that its particles reach, and computes the same numbers for them as every other
 //! rank; in sums each node counts once, on the rank that owns it. Tied nodes move with the corners of their
-//! ties, `u_j = Σ P_r u_r`, and pass their forces to these with the same weights, as far as nothing holds them.
+//! ties, `u_j = Σ P_r u_r`, and pass their forces to these with the same weights, as far as nothing holds
+//! them.
 use partition::MAX_LEVEL;
 use partition::comm::Comm;
 
-use super::held::{Along, Held, Holder, Wall, dot, without};
+use super::held::{Along, Held, Holder, Wall, without};
 use crate::boundary::Contact;
 use crate::boundary::motion::Rate;
 use crate::exact_sum::ExactSum;
@@ -17,7 +18,7 @@ use crate::load::Kind;
 use crate::quantity::in_job;
 use crate::solver::physics::Physics;
 use crate::solver::state::Solver;
-use crate::solver::state::inside::{Asked, Inside};
+use crate::solver::state::inside::{Asked, Inside, dot};
 use rayon::prelude::*;
 use rustc_hash::FxHashMap;
 
@@ -77,8 +78,8 @@ impl<const D: usize> Unknowns<D> {
         }
     }
 
-    /// Ties nodes that hardly any material reaches, and that have no tie so far, to the heaviest node around. Left
-    /// free, they would move without end to relieve the little stress that they bear.
+    /// Ties nodes that hardly any material reaches, and that have no tie so far, to the heaviest node around.
+    /// Left free, they would move without end to relieve the little stress that they bear.
     fn tie_slivers(&mut self) {
         let tied = self.tied();
         let places = self.lattice.iter().zip(0..).map(|(place, number)| (*place, number));
@@ -222,7 +223,8 @@ impl<const D: usize> Unknowns<D> {
 }
 
 impl<const D: usize> Solver<D> {
-    /// Collective over neighbours. The unknowns of a step of length `dt` (s): real nodes whose rows have mass.
+    /// Collective over neighbours. The unknowns of a step of length `dt` (s): real nodes whose rows have
+    /// mass.
     pub(super) fn unknowns(&mut self, rates: &[Rate<D>], dt: f64) -> Unknowns<D> {
         let mut ties = self.grid.ties.take();
         if let Some(ties) = &mut ties {

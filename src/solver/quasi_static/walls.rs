@@ -12,8 +12,9 @@
 //! of displacements and forces by projection.
 use partition::comm::Comm;
 
-use super::held::{Along, Held, Holder, Next, State, Wall, axis, dot, without};
+use super::held::{Along, Held, Holder, Next, State, Wall, axis, without};
 use super::unknowns::{Nodal, Unknowns};
+use crate::solver::state::inside::dot;
 
 /// Displacement, in cells, below which a node is where it should be.
 const SAME: f64 = 1e-9;
@@ -105,8 +106,8 @@ impl<const D: usize> Unknowns<D> {
         }
     }
 
-    /// Collective, with one reduction. Finds the states of the walls, and friction, from displacements (m), the
-    /// forces that are left (N) and the stiffness of the nodes, N/m; forces up to `slack` (N) count as none.
+    /// Collective, with one reduction. Finds the states of the walls, and friction, from displacements (m),
+    /// the forces that are left (N) and the stiffness of the nodes, N/m; forces up to `slack` (N) count as none.
     /// States change where they are most wrong: down to a `share` of the greatest excess. Returns whether any
     /// is another on this rank.
     pub(super) fn settle_walls(
@@ -152,7 +153,7 @@ impl<const D: usize> Unknowns<D> {
         [has(State::Slides), has(State::Sticks)]
     }
 
-    /// What is left to the prescribed displacements; 0 for what is free.
+    /// Way to the prescribed displacements; 0 for directions that are free.
     pub(super) fn way_to_held(&self, way: &Nodal<D>) -> Nodal<D> {
         let along = |(way, held): (&[f64; D], &[Option<Held>; D])| {
             std::array::from_fn(|a| held[a].map_or(0.0, |held| held.way - way[a]))

@@ -338,7 +338,8 @@ fn along<const D: usize>(x: &[f64; D], far: f64, direction: &[f64; D]) -> [f64; 
     std::array::from_fn(|a| far.mul_add(direction[a], x[a]))
 }
 
-fn dot<const D: usize>(a: &[f64; D], b: &[f64; D]) -> f64 {
+/// Inner product.
+pub(in crate::solver) fn dot<const D: usize>(a: &[f64; D], b: &[f64; D]) -> f64 {
     (0..D).fold(0.0, |sum, k| a[k].mul_add(b[k], sum))
 }
 

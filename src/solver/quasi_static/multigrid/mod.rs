@@ -1,7 +1,7 @@
 //! Preconditioner of the linear systems: a V-cycle of multigrid over cells as elements.
 //!
 //! Its finest level has the unknowns themselves and, for the stiffness of the particles, that of cells as
-//! elements ([`super::bricks`]): hanging and tied nodes follow as in the grid, so it differs from the matrix
+//! elements (`bricks`): hanging and tied nodes follow as in the grid, so it differs from the matrix
 //! of the linear system only in where stress is sampled. Each coarser level has cells of twice the least
 //! edge, larger ones as they are, and `Pᵀ A P` as its matrix; the last, of few nodes, is solved directly. The
 //! smoother is Chebyshev's iteration with the blocks of the diagonal, which no order of nodes affects.
@@ -9,17 +9,32 @@
 //! Every rank has all levels and computes the same cycle, so each application takes one reduction: of the
 //! forces on all unknowns, as whole numbers of 2⁻⁴⁵ of about their norm. Bits therefore do not depend on
 //! ranks.
+//!
+//! | file | what it holds |
+//! |---|---|
+//! | `everywhere` | nodes of all ranks |
+//! | `lattice` | cells on the lattice of the finest nodes |
+//! | `bricks` | cells as elements |
+//! | `blocks` | sparse matrices of blocks, smoother, cycle |
+//! | `skyline` | factors of a symmetric matrix |
+//! | this | the levels, and the preconditioner |
+mod blocks;
+mod bricks;
+mod everywhere;
+mod lattice;
+mod skyline;
+
 use partition::Forest;
 use partition::comm::Comm;
 use rayon::prelude::*;
 use rustc_hash::FxHashMap;
 
-use super::blocks::{Blocks, Level, Weights, cycle, factors, without_held};
-use super::bricks::Bricks;
-use super::everywhere::{Everywhere, Map, Share, between, whole_unit};
-use super::lattice::{Lattice, Mesh};
+use self::blocks::{Blocks, Level, Weights, cycle, factors, without_held};
+use self::bricks::Bricks;
+use self::everywhere::{Everywhere, Map, Share, between, whole_unit, without_axes};
+use self::lattice::{Lattice, Mesh};
+use self::skyline::Skyline;
 use super::points::Points;
-use super::skyline::Skyline;
 use super::unknowns::{Nodal, Unknowns};
 use crate::exact_sum::ExactSum;
 use crate::grid::plan::GridPlan;
@@ -153,7 +168,7 @@ impl<const D: usize> Multigrid<D> {
     /// A map by its number.
     fn map(&self, number: u32) -> Map<D> {
         match number {
-            0 => std::array::from_fn(|i| std::array::from_fn(|k| if i == k { 1.0 } else { 0.0 })),
+            0 => without_axes(0),
             _ => self.maps[number as usize],
         }
     }

@@ -2,7 +2,7 @@
 use rayon::prelude::*;
 
 use super::skyline::Skyline;
-use super::unknowns::Nodal;
+use crate::solver::quasi_static::unknowns::Nodal;
 
 /// Weights of nodes of the next coarser level, or of unknowns.
 pub(super) type Weights = Vec<(u32, f64)>;

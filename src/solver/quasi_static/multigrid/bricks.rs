@@ -8,7 +8,6 @@ use rayon::prelude::*;
 
 use super::everywhere::{all_of, whole_unit};
 use super::lattice::{Cell, overlaps, slope, weight};
-use super::points::{Matrix, Points};
 use crate::grid::plan::GridPlan;
 use crate::grid::plan::ghost_layer::Cover;
 use crate::kernel::{BLOCK, Coordinates, Scheme, Select, domain};
@@ -16,6 +15,7 @@ use crate::particle::Chunk;
 use crate::particle::chunk::Layout;
 use crate::particle::volume::box_volume;
 use crate::simd::{LANES, Lanes, Vector};
+use crate::solver::quasi_static::points::{Matrix, Points};
 
 /// A part of the box of a particle.
 struct Part {

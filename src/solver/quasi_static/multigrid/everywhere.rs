@@ -5,8 +5,8 @@ use partition::comm::Comm;
 use rustc_hash::FxHashMap;
 
 use super::lattice::Lattice;
-use super::unknowns::Unknowns;
 use crate::grid::constraints::parents::parents_of;
+use crate::solver::quasi_static::unknowns::Unknowns;
 
 /// An unknown that a corner of a cell follows: number, axes on which it does not, a bit each, weight, and the
 /// number of the map of its displacement, 0 for none.
@@ -14,6 +14,12 @@ pub(super) type Share = (u32, u8, f64, u32);
 
 /// A map of displacements.
 pub(super) type Map<const D: usize> = [[f64; D]; D];
+
+/// The map that takes out the displacements along the axes of these bits; the identity for none.
+pub(super) fn without_axes<const D: usize>(bits: u8) -> Map<D> {
+    let is_own = |i: usize, k: usize| i == k && bits >> i & 1 == 0;
+    std::array::from_fn(|i| std::array::from_fn(|k| f64::from(u8::from(is_own(i, k)))))
+}
 
 /// Values of all ranks in the order of the ranks, on every rank.
 pub(super) fn all_of<T: bytemuck::Pod>(comm: &Comm, own: &[T]) -> Vec<T> {
@@ -97,13 +103,8 @@ impl<const D: usize> Everywhere<D> {
             let map = match (known(&node), known(&corner)) {
                 (None, None) => 0,
                 (own, of_corner) => {
-                    let free = |bits: u8| -> Map<D> {
-                        let diagonal = |a: usize| f64::from(1 - (bits >> a & 1));
-                        std::array::from_fn(|i| {
-                            std::array::from_fn(|k| if i == k { diagonal(i) } else { 0.0 })
-                        })
-                    };
-                    let own = own.map_or(free(held), |own| product(&free(held), own));
+                    let free = without_axes(held);
+                    let own = own.map_or(free, |own| product(&free, own));
                     held = 0;
                     maps.push(of_corner.map_or(own, |of_corner| product(&own, of_corner)));
                     maps.len() as u32 - 1
@@ -159,9 +160,8 @@ fn projections<const D: usize>(comm: &Comm, unknowns: &Unknowns<D>) -> BTreeMap<
     let mut all: BTreeMap<Lattice<D>, Projection<D>> = BTreeMap::new();
     for words in all_of(comm, &words).chunks_exact(2 * D) {
         let along: [f64; D] = std::array::from_fn(|a| f64::from_bits(words[D + a] as u64));
-        let identity = || std::array::from_fn(|i| std::array::from_fn(|k| if i == k { 1.0 } else { 0.0 }));
-        let (known, map) =
-            all.entry(std::array::from_fn(|a| words[a])).or_insert_with(|| (Vec::new(), identity()));
+        let place = std::array::from_fn(|a| words[a]);
+        let (known, map) = all.entry(place).or_insert_with(|| (Vec::new(), without_axes(0)));
         known.push(along);
         for (i, row) in map.iter_mut().enumerate() {
             row.iter_mut().zip(&along).for_each(|(value, other)| *value -= along[i] * other);
