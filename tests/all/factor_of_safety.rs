@@ -89,6 +89,27 @@ fn a_vertical_cut_has_the_same_factor_on_any_ranks_and_across_restart() {
     });
 }
 
+/// N lies between 3.7752 and 3.7776 (Kammoun et al. 2010). Cells are a twentieth of the height.
+#[test]
+fn a_vertical_cut_has_the_factor_of_limit_analysis() {
+    let directory = tempfile::tempdir().expect("temporary directory");
+    let path = directory.path().join("cut.toml");
+    std::fs::write(&path, CUT).expect("job");
+    let cells = "tree.regions=[{ level = 1, shape = { kind = 'box', min = [0.4, 0], max = [4, 2.4] } }, \
+                 { level = 2, shape = { kind = 'box', min = [1.6, 0.6], max = [3, 2.4] } }]";
+    succeed(&mut run(directory.path(), 1, 2, &path, &["--quiet", "--set", cells]));
+    let [Some(stands), Some(slides)] = factors(directory.path(), "cut") else { panic!("no factor") };
+    let off = [stands, slides].map(|factor| 2.0 * factor / 3.7764 - 1.0);
+    println!(
+        "N = {:.3} to {:.3}: {:+.1} to {:+.1} %",
+        2.0 * stands,
+        2.0 * slides,
+        100.0 * off[0],
+        100.0 * off[1]
+    );
+    assert!(off[0] > -0.03 && off[1] < 0.05, "{off:?}");
+}
+
 /// A run whose last factor still has equilibrium, and one without any, end as well, and say so.
 #[test]
 fn a_search_tells_when_its_factors_are_too_low_or_too_high() {
