@@ -25,7 +25,7 @@ pub enum Sampled {
     VolumeFraction,
     /// Mass per space, kg/m³.
     Density,
-    /// Mean velocity by mass, m/s.
+    /// Mean velocity by mass, m/s. Rings count by their sections in all means.
     Velocity,
     /// Mean Cauchy stress by volume, Pa, tension positive.
     Stress,
@@ -62,12 +62,12 @@ impl Sampled {
 }
 
 /// Material about a point: sums over particles with the weight Π max(0, 1 - |x - x_p| / h), h being the edge
-/// of a cell.
+/// of a cell. Those of rings are of their sections, per metre of circumference.
 #[derive(Clone, Copy, Debug)]
 pub struct Sample<const D: usize> {
     /// Level of the finest leaf that holds the point.
     pub level: u8,
-    /// Volume of a cell there, m³; the integral of the weight.
+    /// Volume of a cell there, m³; the integral of the weight, in axisymmetry beyond the axis.
     pub cell: f64,
     /// The sums.
     pub sums: Readings<D>,

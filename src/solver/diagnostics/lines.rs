@@ -3,7 +3,7 @@ use rayon::prelude::*;
 
 use super::probes::{Wanted, of_leaf, reduced};
 use crate::grid::leaf_geometry::leaf_box;
-use crate::kernel::BLOCK;
+use crate::kernel::{BLOCK, Coordinates};
 use crate::particle::chunk::Tag;
 use crate::probe::line::{Line, Sample, weight};
 use crate::solver::state::Solver;
@@ -15,7 +15,7 @@ impl<const D: usize> Solver<D> {
             return Vec::new();
         }
         let (physics, chunks, root_edge) = (&self.physics, &self.chunks, self.physics.root_edge);
-        let leaves = self.forest.leaves();
+        let (leaves, coordinates) = (self.forest.leaves(), physics.coordinates);
         let boxes: Vec<([f64; D], [f64; D])> = leaves.iter().map(|leaf| leaf_box(leaf, root_edge)).collect();
         let near = |leaf: usize, point: &[f64; D], reach: f64| {
             let (lower, upper) = &boxes[leaf];
@@ -40,16 +40,26 @@ impl<const D: usize> Solver<D> {
                     let body = Tag::unpack(chunk.tags()[p]).body;
                     line.bodies.as_ref().is_none_or(|bodies| bodies.contains(&body))
                 };
-                let of = |p: usize| if counts(p) { weight(point, &chunk.position(p), cell) } else { 0.0 };
+                let of = |p: usize| {
+                    let x = chunk.position(p);
+                    // Rings count by their sections: a mean by volumes would lie further out than the point.
+                    if counts(p) { weight(point, &x, cell) / coordinates.around(x[0]) } else { 0.0 }
+                };
                 of_leaf(physics, chunk, &wanted, of)
             });
             partials.collect::<Vec<_>>()
         };
         let partials: Vec<_> = points.par_iter().zip(&cells).map(about).collect();
         let sums = reduced(&self.comm, partials.into_iter());
-        let samples = sums.into_iter().zip(levels).zip(cells).map(|((sums, level), cell)| Sample {
+        // Share of the weight that lies on this side of the axis.
+        let share = |cells: f64| match coordinates {
+            Coordinates::Axisymmetric if cells < 1.0 => 0.5 + cells * (1.0 - 0.5 * cells),
+            _ => 1.0,
+        };
+        let all = sums.into_iter().zip(levels).zip(cells).zip(&points);
+        let samples = all.map(|(((sums, level), cell), (_, point))| Sample {
             level: level as u8,
-            cell: cell.powi(D as i32),
+            cell: cell.powi(D as i32) * share(point[0] / cell),
             sums,
         });
         let mut samples = samples.collect::<Vec<_>>().into_iter();
