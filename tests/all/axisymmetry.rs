@@ -163,7 +163,7 @@ fn translation(comm: &Comm) {
 }
 
 /// Mean time between changes of sign of the momentum along the radius, times 2.
-fn period(history: &History) -> f64 {
+pub(crate) fn period(history: &History) -> f64 {
     let (time, momentum) = (history.column("time"), history.column("momentum_x"));
     let crossings: Vec<f64> = (1..time.len())
         .filter(|&i| momentum[i - 1] * momentum[i] < 0.0)

@@ -40,6 +40,7 @@ mod probes;
 mod quasi_static;
 mod report;
 mod rigid_contact;
+mod ring_tables;
 mod rings;
 mod rings_manufactured;
 mod rings_of_water;
