@@ -167,8 +167,8 @@ fn rounding_of_faces_does_not_matter() {
     assert_eq!(make(1.5 - 1e-12), exact);
 }
 
-/// Which of these bodies are fitted without a word: shapes and materials ("rubber", "steel" or "sand") in a domain
-/// of 4 by 2 m.
+/// Which of these bodies are fitted without a word: shapes and materials ("rubber", "steel" or "sand") in a
+/// domain of 4 by 2 m.
 fn fitted(bodies: &[(&str, &str)]) -> Vec<bool> {
     let bodies: String = (bodies.iter().enumerate())
         .map(|(i, (material, shape))| {

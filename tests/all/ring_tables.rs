@@ -17,8 +17,8 @@ fn rotating(a: f64, is_thin: bool, r: f64) -> [f64; 3] {
     [radial, hoop, r / young * (hoop - nu * radial)]
 }
 
-/// A disk and a ring, 32 cells over the outer radius; thin ones have two cells over half of their thickness. Stresses differ by the
-/// share of the greatest.
+/// A disk and a ring, 32 cells over the outer radius; thin ones have two cells over half of their thickness.
+/// Stresses differ by the share of the greatest.
 #[test]
 fn disks_and_rings_in_rotation_have_the_stresses_of_the_closed_form() {
     // Rows of an independent table: hole, whether it is thin, radius, stresses, displacement.
@@ -85,9 +85,9 @@ fn disks_and_rings_in_rotation_have_the_stresses_of_the_closed_form() {
     }
 }
 
-/// First breathing mode of a body of the outer radius 1 m and the inner radius 0.5 m, which is a sphere (`angles` 2) or a cylinder (1), at
-/// radius s, as a parabola: from the inner wall, where there is no stress, by Runge and Kutta's method. `k` is the wave number, `ratio` the one
-/// of lateral to radial stiffness.
+/// First breathing mode of a body of the outer radius 1 m and the inner radius 0.5 m, which is a sphere (`angles`
+/// 2) or a cylinder (1), at radius s, as a parabola: from the inner wall, where there is no stress, by Runge and
+/// Kutta's method. `k` is the wave number, `ratio` the one of lateral to radial stiffness.
 fn mode(angles: f64, k: f64, ratio: f64) -> String {
     let steps = 200;
     let h = 0.5 / f64::from(steps);

@@ -70,8 +70,8 @@ impl<const D: usize> Wall<D> {
 
     /// The state that a node with this displacement (m) and this force that the wall has to bear (N) should
     /// have; displacements up to `near` (m) and forces up to `slack` (N) count as none. `free` takes out of a
-    /// vector the directions that other supports hold. A node goes from sticking to leaving and back over sliding: what sticks may
-    /// pull though what slides presses.
+    /// vector the directions that other supports hold. A node goes from sticking to leaving and back over
+    /// sliding: what sticks may pull though what slides presses.
     pub(super) fn next(
         &self,
         way: &[f64; D],
