@@ -15,17 +15,22 @@ pub const STICKS: f64 = 0.1;
 /// floor.
 const CLOSED: f64 = 1e-6;
 
-/// Width of a gap, in cells, up to which surfaces that stick or let nothing leave hold what moves away.
+/// The same for surfaces that hold material both ways: what the sums of material at rest are off by. With
+/// less, bodies under load between such walls would settle in states that depend on the way.
+const CLOSED_BOTH_WAYS: f64 = 0.04;
+
+/// Width of a gap, in cells, up to which surfaces that hold material both ways hold what moves away.
 const HELD: f64 = 0.5;
 
 /// Height of the surface of the material over a node along the normal of a rigid surface, in cells of edge
 /// `cell` (m), from `Σ V w` (m³) and `-Σ V ∂w/∂n` (m²). Material that does not end towards the surface is all
-/// round the node.
-pub fn height(volume: f64, slope: f64, cell: f64) -> f64 {
+/// round the node. Rings over a surface with the curvature `bend / cell` have `1 + bend / 3` times the volume
+/// that they would have with its circumference throughout, if they end at it.
+pub fn height(volume: f64, slope: f64, cell: f64, bend: f64) -> f64 {
     if slope <= 0.0 {
         return -1.0;
     }
-    let q = volume / (cell * slope);
+    let q = volume / (cell * slope * (1.0 + bend / 3.0));
     // A plane in the lower half of the hat leaves (1 + s)² / 2 of it behind it, at s = -y: the same ratio,
     // solved for s.
     if q <= 0.5 { 1.0 - 2.0 * q } else { q.mul_add(q, 2.0).sqrt() - q - 1.0 }
@@ -94,10 +99,13 @@ impl Bounds {
     /// Of material that touches the surface.
     pub const TOUCHING: Self = Self { least: 0.0, most: 0.0, sticking: 0.0, drag: 0.0 };
 
-    /// Across a gap (m) between nodes with cells of this edge (m), in a step of length `dt`, s.
-    pub fn across(gap: f64, cell: f64, dt: f64) -> Self {
-        let least = if gap > CLOSED * cell { -gap / dt } else { 0.0 };
-        Self { least, most: if gap <= HELD * cell { 0.0 } else { f64::INFINITY }, sticking: 0.0, drag: 0.0 }
+    /// Across a gap (m) between nodes with cells of this edge (m), in a step of length `dt`, s, to a surface
+    /// that holds material `both_ways` or lets it leave.
+    pub fn across(gap: f64, cell: f64, dt: f64, both_ways: bool) -> Self {
+        let closed = if both_ways { CLOSED_BOTH_WAYS } else { CLOSED };
+        let least = if gap > closed * cell { -gap / dt } else { 0.0 };
+        let most = if both_ways && gap <= HELD * cell { 0.0 } else { f64::INFINITY };
+        Self { least, most, sticking: 0.0, drag: 0.0 }
     }
 }
 
@@ -119,26 +127,29 @@ mod tests {
         for from in [0.9, 0.5, 0.1, 0.0, -0.1, -0.5, -0.9] {
             for cover in [1.0, 0.5, 0.01] {
                 let (volume, slope) = sums(from, cover);
-                approx::assert_relative_eq!(height(volume, slope, 1.0), from, epsilon = 1e-12);
+                approx::assert_relative_eq!(height(volume, slope, 1.0, 0.0), from, epsilon = 1e-12);
             }
         }
-        assert_eq!(height(1.0, 0.0, 1.0), -1.0);
+        assert_eq!(height(1.0, 0.0, 1.0, 0.0), -1.0);
     }
 
     #[test]
     fn heights_are_in_cells() {
         let (volume, slope) = sums(0.25, 1.0);
-        approx::assert_relative_eq!(height(0.125 * volume, 0.25 * slope, 0.5), 0.25, epsilon = 1e-12);
+        approx::assert_relative_eq!(height(0.125 * volume, 0.25 * slope, 0.5, 0.0), 0.25, epsilon = 1e-12);
     }
 
     #[test]
     fn gaps_close_within_the_step_and_no_further() {
-        assert_eq!(Bounds::across(-0.1, 1.0, 0.5), Bounds::TOUCHING);
-        assert_eq!(Bounds::across(0.25, 1.0, 0.5), Bounds { least: -0.5, ..Bounds::TOUCHING });
-        assert_eq!(
-            Bounds::across(0.75, 1.0, 0.5),
-            Bounds { least: -1.5, most: f64::INFINITY, ..Bounds::TOUCHING }
-        );
+        let (free, both_ways) = (f64::INFINITY, true);
+        assert_eq!(Bounds::across(-0.1, 1.0, 0.5, both_ways), Bounds::TOUCHING);
+        assert_eq!(Bounds::across(0.01, 1.0, 0.5, both_ways), Bounds::TOUCHING);
+        assert_eq!(Bounds::across(0.25, 1.0, 0.5, both_ways), Bounds { least: -0.5, ..Bounds::TOUCHING });
+        let far = Bounds { least: -1.5, most: free, ..Bounds::TOUCHING };
+        assert_eq!(Bounds::across(0.75, 1.0, 0.5, both_ways), far);
+        assert_eq!(Bounds::across(0.75, 1.0, 0.5, false), far);
+        let near = Bounds { least: -0.02, most: free, ..Bounds::TOUCHING };
+        assert_eq!(Bounds::across(0.01, 1.0, 0.5, false), near);
         let free = Contact::default().bounds(Bounds::TOUCHING);
         assert_eq!(free, Bounds { most: f64::INFINITY, ..Bounds::TOUCHING });
     }

@@ -141,6 +141,15 @@ impl Coordinates {
         }
     }
 
+    /// Curvature, in cells of this edge (m), of a surface at this first coordinate (m) whose normal has this
+    /// first component, along the circumference. Positive where material over it lies outside.
+    pub fn bend(self, normal: f64, cell: f64, x: f64) -> f64 {
+        match self {
+            Self::Cartesian => 0.0,
+            Self::Axisymmetric => normal * cell / x.max(cell),
+        }
+    }
+
     /// Half width of the box of a particle, m, from the value in [`crate::particle::Layout::HALF`] and the
     /// first coordinate of its centre, m.
     pub fn half_width(self, half: f64, x: f64) -> f64 {

@@ -255,7 +255,7 @@ impl Law for Shocked {
     }
 
     fn is_firm(&self) -> bool {
-        true
+        self.metal.is_firm()
     }
 
     fn history_names(&self) -> &'static [&'static str] {

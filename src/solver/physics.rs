@@ -3,6 +3,7 @@ use std::ops::Range;
 
 use crate::adaptivity::{Adaptivity, Cohesion};
 use crate::boundary::absorbing::AbsorbingFaces;
+use crate::boundary::contact::can_tell_yield;
 use crate::boundary::{BodyContacts, Collider, Contact, Leaving, Meets};
 use crate::kernel::{BoxPolicy, Coordinates, Scheme, Transfer};
 use crate::load::{self, Gravity, Load, Seepage, Water};
@@ -256,11 +257,21 @@ impl<const D: usize> Physics<D> {
         self.meets(field) == Meets::Surface || self.is_firm(field)
     }
 
-    /// Whether it does as long as it is elastic. Sums that have to tell what has yielded say neither the area of
-    /// the material nor where bodies meet.
+    /// Whether it does as long as it is elastic.
     pub(in crate::solver) fn is_firm(&self, field: usize) -> bool {
-        let is_alone = self.body_contacts.fields() == 1 && !self.has_walls_by_area();
-        self.meets(field) == Meets::Firm && is_alone
+        self.meets(field) == Meets::Firm
+            && can_tell_yield(self.body_contacts.fields(), self.laws_at_surfaces())
+    }
+
+    /// Laws at faces and colliders.
+    fn laws_at_surfaces(&self) -> impl Iterator<Item = Contact> {
+        let of_colliders = self.colliders.iter().map(|collider| collider.contact);
+        self.faces.iter().flatten().copied().chain(of_colliders)
+    }
+
+    /// Whether any face or collider has a law by the area of the material at it.
+    pub(in crate::solver) fn has_walls_by_area(&self) -> bool {
+        self.laws_at_surfaces().any(Contact::acts_by_area)
     }
 
     /// Whether a collider acts on a velocity field at the feet of the nodes inside it, in this stage. Cohesion

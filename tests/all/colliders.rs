@@ -299,9 +299,11 @@ fn rest_on(law: &str, young: f64, surface: f64, collider: &str) -> [f64; 2] {
     [gap, history.last("stress_b_yy") / (-9810.0 * (height - 0.5 * cell))]
 }
 
-/// On faces and colliders at any height between rows of nodes, with soft and stiff material, and metal and clay
-/// that have not yielded: the block lies on the surface, and its lowest rows carry its weight. Without the gap it hovers up to a cell above, and
-/// the lowest row has 6 to 23 times the stress.
+/// On faces and colliders of each kind, at any height between rows of nodes, with soft and stiff material, and
+/// metal and clay that have not yielded: the block lies on the surface, and its lowest rows carry its weight.
+/// Without the gap it hovers up to a cell above, and the lowest row has 6 to 23 times the stress. On `slip`
+/// colliders between rows the stress is within 6 %; nodes behind a `sticky` one hold, so that there its lowest
+/// row is right on rows alone.
 #[test]
 fn blocks_come_to_rest_on_the_surface_with_their_weight() {
     let floor = |height: f64| {
@@ -312,6 +314,14 @@ fn blocks_come_to_rest_on_the_surface_with_their_weight() {
     let elastic = "model = 'neo_hookean'";
     let mut cases = vec![(elastic, 1e5, 0.0, String::new()), (elastic, 1e6, 0.0, String::new())];
     cases.extend([0.25, 0.265625, 0.28125, 0.31].map(|height| (elastic, 1e6, height, floor(height))));
+    for kind in ["slip", "sticky"] {
+        let law = format!("contact = {{ kind = '{kind}' }}");
+        let face = format!("[boundaries]\ny_min = {{ kind = '{kind}' }}");
+        cases.extend([1e5, 1e6, 1e8].map(|young| (elastic, young, 0.0, face.clone())));
+        cases.push((elastic, 1e6, 0.25, format!("{}\n{law}", floor(0.25))));
+        let between = [0.265625, 0.28125, 0.31].into_iter().filter(|_| kind == "slip");
+        cases.extend(between.map(|height| (elastic, 1e6, height, format!("{}\n{law}", floor(height)))));
+    }
     for law in ["model = 'von_mises'\nyield_stress = 1e5", "model = 'tresca'\nyield_stress = 1e5"] {
         cases.extend([(law, 1e6, 0.0, String::new()), (law, 1e6, 0.28125, floor(0.28125))]);
     }
@@ -321,7 +331,8 @@ fn blocks_come_to_rest_on_the_surface_with_their_weight() {
             "{law}, E {young:e}, surface at {surface} m: gap {gap:.4} cells, stress {stress:.4} of the weight"
         );
         assert!(gap.abs() < 0.05, "{law}, E {young:e}, {surface} m: gap {gap}");
-        assert!((stress - 1.0).abs() < 0.05, "{law}, E {young:e}, {surface} m: stress {stress}");
+        let bar = if collider.contains("slip") { 0.06 } else { 0.05 };
+        assert!((stress - 1.0).abs() < bar, "{law}, E {young:e}, {surface} m: stress {stress}");
     }
 }
 

@@ -135,7 +135,7 @@ fn a_run_that_fails_has_a_page_that_says_why_and_from_where_to_go_on() {
         "min = [0.25, 0.0], max = [0.75, 0.25] }",
         "min = [0.25, 0.25], max = [0.75, 0.5] }\nvelocity = [0, 50]",
     );
-    let block = block.replace("[boundaries]\n", "[boundaries]\ny_max = { kind = 'sticky' }\n");
+    let block = block.replace("[boundaries]\n", "[boundaries]\ny_max = { kind = 'symmetric' }\n");
     let job = JOB.replace("min = [0, 0.25], max = [1, 0.4]", "min = [0, 0.05], max = [1, 0.1]");
     std::fs::write(here.join("press.toml"), [job, block].concat()).expect("written");
     let run = |options: &[&str]| {

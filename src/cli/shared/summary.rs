@@ -2,6 +2,7 @@
 use std::io::Write;
 
 use crate::adaptivity::Adaptivity;
+use crate::boundary::contact::can_tell_yield;
 use crate::boundary::{ActsOn, Contact, Meets};
 use crate::job::Problem;
 use crate::job::problem::{Coordinates, InStages};
@@ -212,10 +213,10 @@ fn write_refinement<const D: usize>(
 /// yields, if surfaces let go of anything.
 fn held_at_nodes<const D: usize>(problem: &Problem<D>) -> Option<String> {
     let of_colliders = problem.colliders.iter().filter(|collider| collider.acts_on == ActsOn::Nodes);
-    let of_colliders = of_colliders.map(|collider| collider.contact != Contact::Sticky);
+    let of_colliders = of_colliders.map(|collider| collider.contact);
     let of_faces = problem.stages.iter().flat_map(|stage| stage.faces.as_flattened()).flatten();
     let of_each_face = problem.faces.as_flattened().iter().chain(of_faces);
-    if !of_colliders.chain(of_each_face.clone().map(|face| face.has_gap())).any(|acts| acts) {
+    if !of_colliders.chain(of_each_face.clone().copied()).any(Contact::has_gap) {
         return None;
     }
     let last = problem.stages.len().saturating_sub(1);
@@ -224,10 +225,8 @@ fn held_at_nodes<const D: usize>(problem: &Problem<D>) -> Option<String> {
     let field_of_body = &problem.body_contacts.field_of_body;
     let field = |body: usize| field_of_body.get(body).map_or(0, |&field| usize::from(field));
     let bodies = problem.bodies.iter().enumerate();
-    let by_area = |contact: &Contact| contact.acts_by_area();
-    let is_alone = problem.body_contacts.fields() == 1
-        && !problem.colliders.iter().any(|collider| by_area(&collider.contact))
-        && !of_each_face.clone().any(by_area);
+    let laws = problem.colliders.iter().map(|collider| collider.contact).chain(of_each_face.copied());
+    let is_alone = can_tell_yield(problem.body_contacts.fields(), laws);
     let at_nodes = |meets: Meets| meets == Meets::Nodes || (meets == Meets::Firm && !is_alone);
     let bodies = bodies.filter(|(number, _)| at_nodes(meets[field(*number)]));
     let names: Vec<String> = bodies.map(|(_, body)| excerpt(&body.name, NAME).into()).collect();

@@ -230,7 +230,7 @@ impl Law for Ductile {
     }
 
     fn is_firm(&self) -> bool {
-        true
+        self.metal.is_firm()
     }
 
     fn has_failed(&self, history: &[f64; HISTORIES]) -> bool {

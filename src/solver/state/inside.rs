@@ -21,7 +21,7 @@ const WAY: f64 = 1e-3;
 /// What is asked of the nodes inside a collider, beside which they are.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::solver) struct Asked {
-    /// Whether the surfaces that they are behind are: for feet.
+    /// Whether the surfaces that they are behind are: for feet and gaps.
     pub planes: bool,
     /// Whether normals are: to hold the nodes themselves.
     pub normals: bool,
@@ -34,9 +34,10 @@ impl Asked {
     /// What the velocity fields of a problem ask of the nodes inside a collider.
     pub(in crate::solver) fn of<const D: usize>(physics: &Physics<D>, collider: &Collider<D>) -> Self {
         let at_feet = |field: usize| physics.acts_at_feet(field, collider);
+        let over_gaps = |field: usize| physics.moves_over_gaps(field);
         let fields = 0..physics.body_contacts.fields();
         Self {
-            planes: fields.clone().any(at_feet),
+            planes: fields.clone().any(|field| at_feet(field) || over_gaps(field)),
             normals: collider.contact != Contact::Sticky && !fields.into_iter().all(at_feet),
         }
     }

@@ -7,7 +7,7 @@ use crate::boundary::{Bounds, Contact, gap};
 use crate::exact_sum::ExactSum;
 use crate::grid::mask::block_nodes;
 use crate::grid::{GridPlan, NodeFields};
-use crate::kernel::Row;
+use crate::kernel::{Coordinates, Row};
 use crate::leapfrog::Lengths;
 use crate::quantity::in_job;
 use crate::solver::physics::Physics;
@@ -169,6 +169,8 @@ pub struct Gaps<'a> {
     pub over: f64,
     /// Whether it touches the surface wherever it is.
     pub touches: bool,
+    /// Coordinates of the domain.
+    pub coordinates: Coordinates,
 }
 
 impl<const D: usize> Physics<D> {
@@ -177,35 +179,33 @@ impl<const D: usize> Physics<D> {
         let touches = !self.moves_over_gaps(field);
         let over =
             walls.known_over.map(|lengths| lengths.drift).filter(|_| !touches || self.has_walls_by_area())?;
-        Some(Gaps { sums: &solids[field].field.fields.rows, over, touches })
-    }
-
-    /// Whether any face or collider has a law by the area of the material at it.
-    pub(in crate::solver) fn has_walls_by_area(&self) -> bool {
-        let of_colliders = self.colliders.iter().map(|collider| collider.contact);
-        self.faces.iter().flatten().copied().chain(of_colliders).any(Contact::acts_by_area)
+        Some(Gaps { sums: &solids[field].field.fields.rows, over, touches, coordinates: self.coordinates })
     }
 }
 
 impl Gaps<'_> {
-    /// Bounds on the velocity of a node on a face with this normal into the domain, of cells of this edge, m.
+    /// Bounds on the velocity of a node at `x` (m) on a face with this normal into the domain, of cells of this
+    /// edge, m.
     /// `cohesion` is the velocity that cohesion over an area of 1 m² (in plane strain 1 m) takes away at
     /// most, m/s; `drag` is the way of the surface in the step by a velocity of 1 m/s, times the coefficient
     /// of drag, s.
     fn bounds<const D: usize>(
         &self,
-        node: usize,
+        (node, x): (usize, &[f64; D]),
         normal: &[f64; D],
         cell: f64,
         [cohesion, drag]: [f64; 2],
+        both_ways: bool,
     ) -> Bounds {
         let row = self.sums[node].0;
         let slope = -(0..D).fold(0.0, |sum, a| row[a].mul_add(normal[a], sum));
-        let gap = cell * gap::height(row[3], slope, cell);
+        let bend = self.coordinates.bend(normal[0], cell, x[0]);
+        let gap = cell * gap::height(row[3], slope, cell, bend);
         // At a face the slope is the area that the material has of it.
         let area = if self.touches || gap <= gap::STICKS * cell { slope.max(0.0) } else { 0.0 };
         let (sticking, drag) = (cohesion * area, if row[3] > 0.0 { drag * area / row[3] } else { 0.0 });
-        let bounds = if self.touches { Bounds::TOUCHING } else { Bounds::across(gap, cell, self.over) };
+        let bounds =
+            if self.touches { Bounds::TOUCHING } else { Bounds::across(gap, cell, self.over, both_ways) };
         Bounds { sticking, drag, ..bounds }
     }
 }
@@ -237,9 +237,9 @@ pub fn apply_faces<const D: usize>(
                     let before = velocity;
                     let block = &plan.blocks[node as usize / block_nodes(D)];
                     let cell = plan.cell(block.level);
+                    let x = plan.node_place(block, node as usize % block_nodes(D));
                     match faces.absorbing.and_then(|absorbing| absorbing[axis][side].as_ref()) {
                         Some(face) => {
-                            let x = plan.node_place(block, node as usize % block_nodes(D));
                             let pressure = face.pressure.at(in_job(&faces.origin, &x), faces.middle);
                             let start = faces.start.get(node as usize).map_or([0.0; 4], |row| row.0);
                             face.apply(
@@ -257,7 +257,9 @@ pub fn apply_faces<const D: usize>(
                                 if row[3] > 0.0 { law.cohesion() * faces.kick / row[3] } else { 0.0 };
                             let gaps = faces.gaps.filter(|_| law.has_gap());
                             let by_area = [cohesion, law.drag() * faces.kick];
-                            let bounds = gaps.map(|gaps| gaps.bounds(node as usize, &normal, cell, by_area));
+                            let both_ways = law.holds_both_ways();
+                            let at = (node as usize, &x);
+                            let bounds = gaps.map(|gaps| gaps.bounds(at, &normal, cell, by_area, both_ways));
                             law.apply_within(bounds.unwrap_or(Bounds::TOUCHING), &mut velocity, &normal);
                         }
                     }

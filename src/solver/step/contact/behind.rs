@@ -6,6 +6,7 @@
 //! particles had no stress, while those of the next row bore all. So it obeys the law of the collider itself.
 use rayon::prelude::*;
 
+use crate::boundary::Bounds;
 use crate::boundary::motion::Rate;
 use crate::exact_sum::ExactSum;
 use crate::grid::mask::{bits, block_nodes};
@@ -85,7 +86,7 @@ impl<const D: usize> Solver<D> {
         for &Behind { collider, node, is_counted, at, normal } in behind {
             let row = &mut self.grid.fields.rows[node];
             let of = (&colliders[collider], &states[collider], &rates[collider]);
-            if let Some(impulse) = obey(row, &at, of, &normal).filter(|_| is_counted) {
+            if let Some(impulse) = obey(row, &at, of, &normal, Bounds::TOUCHING).filter(|_| is_counted) {
                 Touch { collider, position: at, impulse }.book(colliders, states, sums);
             }
         }

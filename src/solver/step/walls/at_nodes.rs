@@ -1,19 +1,20 @@
 //! Nodes that colliders hold themselves, not at their feet.
 //!
-//! These are the nodes inside `sticky` colliders for solids, those inside all colliders for material that has
-//! yielded, and those behind a surface that another collider covers or comes near to. Feet of both surfaces
-//! would be in one cell, and if the colliders move against each other, no velocity of its corners obeys both.
+//! These are the nodes inside `sticky` colliders for solids that have come to the surface, those inside all
+//! colliders for material that has yielded, and those behind a surface that another collider covers or comes
+//! near to. Feet of both surfaces would be in one cell, and if the colliders move against each other, no
+//! velocity of its corners obeys both.
 use rayon::prelude::*;
 
 use crate::boundary::motion::Rate;
-use crate::boundary::{Collider, ColliderState, Contact, gap};
+use crate::boundary::{Bounds, Collider, ColliderState, Contact, gap};
 use crate::exact_sum::ExactSum;
 use crate::grid::mask::{bits, block_nodes};
-use crate::kernel::Row;
+use crate::kernel::{Coordinates, Row};
 use crate::solver::state::Solver;
 use crate::solver::state::bookings::SUMS;
 use crate::solver::state::grid::Grid;
-use crate::solver::state::inside::{Plane, SAME};
+use crate::solver::state::inside::{Inside, Plane, SAME};
 use crate::solver::state::phases::Phase;
 use crate::solver::step::colliders::Touch;
 
@@ -46,9 +47,38 @@ pub(super) fn is_at_another<const D: usize>(
 
 /// Sums by which a node behind this surface tells whether its material has yielded, by its row.
 pub(super) fn has_yielded<const D: usize>(sums: &[Row], row: usize, plane: &Plane<D>, cell: f64) -> bool {
+    let [volume, slope] = along(sums, row, plane);
+    gap::has_yielded(volume, slope, cell)
+}
+
+/// `Σ V w` and `-Σ V ∂w/∂n` of a row along the normal of a surface.
+fn along<const D: usize>(sums: &[Row], row: usize, plane: &Plane<D>) -> [f64; 2] {
     let of_node = sums[row].0;
-    let slope = -(0..D).fold(0.0, |sum, a| of_node[a].mul_add(plane.normal[a], sum));
-    gap::has_yielded(of_node[3], slope, cell)
+    [of_node[3], -(0..D).fold(0.0, |sum, a| of_node[a].mul_add(plane.normal[a], sum))]
+}
+
+/// Demands of the surfaces of a `sticky` collider that the node of this bit at `x` (m), with cells of this
+/// edge (m), is behind, if the material in its row of the sums has come to none of them; none too where no
+/// surface is known.
+fn open<const D: usize>(
+    inside: &Inside<D>,
+    bit: u32,
+    x: &[f64; D],
+    (sums, row): (&[Row], usize),
+    cell: f64,
+    of: Known,
+) -> Vec<(Bounds, [f64; D])> {
+    let planes = inside.planes.iter().filter(|plane| u32::from(plane.bit) == bit);
+    let demands: Vec<_> = planes
+        .map(|plane| {
+            let [volume, slope] = along(sums, row, plane);
+            let above = (0..D).fold(0.0, |sum, a| (x[a] - plane.foot[a]).mul_add(plane.normal[a], sum));
+            let bend = of.coordinates.bend(plane.normal[0], cell, x[0]);
+            let gap = gap::height(volume, slope, cell, bend).mul_add(cell, above);
+            (Bounds::across(gap, cell, of.over, true), plane.normal)
+        })
+        .collect();
+    if demands.iter().any(|(bounds, _)| bounds.least == 0.0) { Vec::new() } else { demands }
 }
 
 impl<const D: usize> Solver<D> {
@@ -68,31 +98,37 @@ impl<const D: usize> Solver<D> {
         let firm = physics.is_firm(field).then_some(field);
         let is_any =
             on_nodes().count() > usize::from(firm.is_none()) || on_nodes().any(|collider| !at_feet(collider));
-        if self.grid.walls.known_over.is_none() || !is_any {
-            return;
-        }
+        let Some(lengths) = self.grid.walls.known_over.filter(|_| is_any) else { return };
+        let of = Known {
+            field,
+            coordinates: physics.coordinates,
+            over: lengths.drift,
+            moves: physics.moves_over_gaps(field),
+            yields: firm.is_some(),
+        };
         let grid = &mut self.grid;
         self.phases.time(Phase::Nodes, || {
-            for touch in hold(grid, colliders, states, rates, firm, at_feet) {
+            for touch in hold(grid, colliders, states, rates, of, at_feet) {
                 touch.book(colliders, states, sums);
             }
         });
     }
 }
 
-/// Has the velocity of the node at `x` (m) obey a collider at a surface with this normal. Returns the impulse
-/// on the collider, kg m/s, if there is any.
+/// Has the velocity of the node at `x` (m) obey a collider at a surface with this normal, within the bounds
+/// that the gap asks for. Returns the impulse on the collider, kg m/s, if there is any.
 pub(in crate::solver::step) fn obey<const D: usize>(
     row: &mut Row,
     x: &[f64; D],
     (collider, state, rate): (&Collider<D>, &ColliderState<D>, &Rate<D>),
     normal: &[f64; D],
+    bounds: Bounds,
 ) -> Option<[f64; D]> {
     let surface = collider.velocity_at(x, &state.pose, rate);
     let before: [f64; D] = std::array::from_fn(|a| row.0[a]);
     let free: [f64; D] = std::array::from_fn(|a| before[a] - surface[a]);
     let mut relative = free;
-    collider.contact.apply(&mut relative, normal);
+    collider.contact.apply_within(bounds, &mut relative, normal);
     if relative == free {
         return None;
     }
@@ -100,18 +136,32 @@ pub(in crate::solver::step) fn obey<const D: usize>(
     Some(std::array::from_fn(|a| row.0[3] * (before[a] - row.0[a])))
 }
 
-/// Applies the conditions; returns impulses in the order of the nodes. `firm` is the number of the velocity
-/// field, where what has yielded is held at nodes.
+/// What the sums at the nodes of a velocity field tell.
+#[derive(Clone, Copy)]
+struct Known {
+    /// Number of the field.
+    field: usize,
+    coordinates: Coordinates,
+    /// Length of the step, s.
+    over: f64,
+    /// Whether its material moves over gaps.
+    moves: bool,
+    /// Whether it does so until it yields, and is held at nodes then.
+    yields: bool,
+}
+
+/// Applies the conditions; returns impulses in the order of the nodes.
 fn hold<const D: usize>(
     grid: &mut Grid<D>,
     colliders: &[Collider<D>],
     states: &[ColliderState<D>],
     rates: &[Rate<D>],
-    firm: Option<usize>,
+    of: Known,
     at_feet: impl Fn(&Collider<D>) -> bool + Sync,
 ) -> Vec<Touch<D>> {
     let Grid { fields, inside_still, inside_moving, plan, solids, .. } = grid;
-    let sums = firm.map(|field| &solids[field].field.fields.rows[..]);
+    let known = |asks: bool| asks.then(|| &solids[of.field].field.fields.rows[..]);
+    let (sums, gaps) = (known(of.yields), known(of.moves));
     let all = [&*inside_still, &*inside_moving];
     let blocks = fields.rows.par_chunks_mut(block_nodes(D)).zip(&plan.blocks).zip(&fields.active);
     let active = blocks.enumerate().with_min_len(32).filter(|(_, (_, active))| **active);
@@ -121,20 +171,29 @@ fn hold<const D: usize>(
         {
             let inside = all.iter().find_map(|inside| inside.get(index)?.get(number)?.as_ref());
             let Some(inside) = inside else { continue };
-            let mut hold = |bit: u32, normal: &[f64; D]| {
+            let cell = plan.cell(block.level);
+            let mut hold = |bit: u32, normal: &[f64; D], bounds: Bounds| {
                 let row = &mut rows[bit as usize];
                 if row.0[3] <= 0.0 || block.real_nodes() >> bit & 1 == 0 {
                     return;
                 }
                 let x = plan.node_place(block, bit as usize);
-                let given = obey(row, &x, (collider, state, rate), normal);
+                let given = obey(row, &x, (collider, state, rate), normal, bounds);
                 if let Some(impulse) = given.filter(|_| block.owned >> bit & 1 == 1) {
                     touches.push(Touch { collider: number, position: x, impulse });
                 }
             };
             if collider.contact == Contact::Sticky && !at_feet(collider) {
-                // All of the velocity is held, whatever the normal is.
-                bits(inside.nodes).for_each(|bit| hold(bit, &[0.0; D]));
+                for bit in bits(inside.nodes) {
+                    let row = index * block_nodes(D) + bit as usize;
+                    let x = || plan.node_place(block, bit as usize);
+                    let demands = gaps.map(|sums| open(inside, bit, &x(), (sums, row), cell, of));
+                    match demands.filter(|demands| !demands.is_empty()) {
+                        Some(demands) => demands.iter().for_each(|(bounds, n)| hold(bit, n, *bounds)),
+                        // All of the velocity is held, whatever the normal is.
+                        None => hold(bit, &[0.0; D], Bounds::TOUCHING),
+                    }
+                }
                 continue;
             }
             if !at_feet(collider) {
@@ -143,17 +202,17 @@ fn hold<const D: usize>(
                     let deep = inside.buried >> bit & 1 == 1;
                     let known = if deep { None } else { normals.next() };
                     let x = || plan.node_place(block, bit as usize);
-                    hold(bit, &known.copied().unwrap_or_else(|| collider.normal(&x(), &state.pose)));
+                    let normal = known.copied().unwrap_or_else(|| collider.normal(&x(), &state.pose));
+                    hold(bit, &normal, Bounds::TOUCHING);
                 }
                 continue;
             }
-            let cell = plan.cell(block.level);
             for plane in &inside.planes {
                 let row = index * block_nodes(D) + usize::from(plane.bit);
                 if sums.is_some_and(|sums| has_yielded(sums, row, plane, cell))
                     || is_at_another(colliders, states, number, plane, cell)
                 {
-                    hold(plane.bit.into(), &plane.normal);
+                    hold(plane.bit.into(), &plane.normal, Bounds::TOUCHING);
                 }
             }
         }

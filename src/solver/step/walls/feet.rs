@@ -4,7 +4,7 @@ use crate::grid::GridPlan;
 use crate::grid::leaf_geometry::leaf_box;
 use crate::grid::mask::{block_nodes, node_of_bit, offset, offset_count, offset_index};
 use crate::grid::plan::{NO_BLOCK, arena_index};
-use crate::kernel::{ARENA_EDGE, BLOCK, Row};
+use crate::kernel::{ARENA_EDGE, BLOCK, Coordinates, Row};
 use crate::leapfrog::Lengths;
 use crate::solver::state::inside::{Inside, Plane, SAME};
 
@@ -192,7 +192,12 @@ impl<const D: usize> Foot<D> {
     /// Gap between the surface and the material, m: the mean over the corners of the cell by the parts of the
     /// material's surface that they have. `sizes` has `Σ V w / h` of the corners in its first lanes, `slopes`
     /// has `Σ V ∇w`. `None` where the material lies on the other side.
-    pub(super) fn gap(&self, sizes: &[[f64; 4]; CORNERS], slopes: &[[f64; 4]; CORNERS]) -> Option<f64> {
+    pub(super) fn gap(
+        &self,
+        coordinates: Coordinates,
+        sizes: &[[f64; 4]; CORNERS],
+        slopes: &[[f64; 4]; CORNERS],
+    ) -> Option<f64> {
         let (mut sum, mut area, mut filled) = (0.0, 0.0, 0.0);
         for corner in 0..1usize << D {
             let slope = -(0..D).fold(0.0, |sum, a| slopes[corner][a].mul_add(self.normal[a], sum));
@@ -202,7 +207,8 @@ impl<const D: usize> Foot<D> {
             if slope > 0.0 && self.weights[corner] > 0.0 {
                 let part = self.weights[corner] * slope;
                 let above = (0..D).fold(0.0, |sum, a| self.arms[corner][a].mul_add(self.normal[a], sum));
-                let height = gap::height(sizes[corner][0], slope, 1.0);
+                let bend = coordinates.bend(self.normal[0], cell, self.at[0] + self.arms[corner][0]);
+                let height = gap::height(sizes[corner][0], slope, 1.0, bend);
                 sum += part * height.mul_add(cell, above);
                 area += part;
             }
@@ -239,7 +245,7 @@ impl<const D: usize> Foot<D> {
             arm: [0.0; D],
             lever: [0.0; D],
             surface,
-            bounds: law.bounds(Bounds::across(gap, self.cell, lengths.drift)),
+            bounds: law.bounds(Bounds::across(gap, self.cell, lengths.drift, law.holds_both_ways())),
             law,
             // Of an area of 1 m² and a density of 1 kg/m³, until these are known.
             sticking: law.cohesion() * over,

@@ -4,7 +4,7 @@ use rayon::prelude::*;
 use super::at_nodes::{has_yielded, is_at_another, obey};
 use super::feet::LeafFeet;
 use crate::boundary::motion::Rate;
-use crate::boundary::{Collider, ColliderState};
+use crate::boundary::{Bounds, Collider, ColliderState};
 use crate::exact_sum::ExactSum;
 use crate::grid::Window;
 use crate::grid::mask::block_nodes;
@@ -134,7 +134,7 @@ impl<const D: usize> Solver<D> {
                 let collider = &colliders[foot.collider];
                 let gap = match touches || !collider.contact.has_gap() {
                     true => Some(0.0),
-                    false => foot.gap(sizes, &foot.at_corners(&fields.rows)),
+                    false => foot.gap(self.physics.coordinates, sizes, &foot.at_corners(&fields.rows)),
                 };
                 *touching = gap.map(|gap| {
                     let surface =
@@ -329,7 +329,8 @@ impl<const D: usize> Solver<D> {
                 let position = plan.node_place(&plan.blocks[block], bit);
                 for (collider, plane) in planes {
                     let of = (&physics.colliders[collider], &states[collider], &rates[collider]);
-                    let given = obey(row, &position, of, &plane.normal).filter(|_| is_counted);
+                    let given =
+                        obey(row, &position, of, &plane.normal, Bounds::TOUCHING).filter(|_| is_counted);
                     touches.extend(given.map(|impulse| Touch { collider, position, impulse }));
                 }
                 return;
