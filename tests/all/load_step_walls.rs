@@ -230,6 +230,190 @@ shape = {{ kind = "box", min = [0.99, 0.95], max = [1.01, 1.02] }}
     });
 }
 
+/// An elastic block of 500 kg on a collider with friction that is turned about (1.5, 1) by 30°, not on nodes. Gravity
+/// is 10 m/s² onto it and, growing to this at 1 s, so much along it, m/s².
+fn on_plane(friction: f64, along: f64, loads: &str) -> String {
+    let (sine, cosine) = 30.0_f64.to_radians().sin_cos();
+    let gravity = |way: f64| [10.0 * sine - way * cosine, -10.0 * cosine - way * sine];
+    let ([x, y], [x_end, y_end]) = (gravity(0.0), gravity(along));
+    let job = format!(
+        r#"
+dimension = 2
+gravity = [[[0, {x}], [1, {x_end}]], [[0, {y}], [1, {y_end}]]]
+[domain]
+size = [3, 3]
+root_edge = 1
+[boundaries]
+x_min.kind = "slip"
+x_max.kind = "slip"
+y_min.kind = "slip"
+y_max.kind = "slip"
+[tree]
+base_level = 2
+[[materials]]
+name = "rubber"
+density = 1000
+model = "hencky"
+young = 1e6
+poisson = 0.3
+[[bodies]]
+name = "block"
+material = "rubber"
+[bodies.shape]
+kind = "rotated"
+centre = [1.5, 1]
+angle = 30
+shape = {{ kind = "box", min = [1, 1], max = [2, 1.5] }}
+[[colliders]]
+name = "plane"
+shape = {{ kind = "half_space", point = [1.5, 1], normal = [{:?}, {cosine:?}] }}
+contact = {{ kind = "separating", friction = {friction} }}
+{loads}
+"#,
+        -sine
+    );
+    load_steps(&job, "step = 0.25")
+}
+
+/// Forces of the block on the plane across and along it, N, in the last row.
+fn on_plane_at_end(found: &History) -> [f64; 2] {
+    let (sine, cosine) = 30.0_f64.to_radians().sin_cos();
+    let [x, y] = ["force_plane_x", "force_plane_y"].map(|name| found.last(name));
+    [sine * x - cosine * y, cosine * x + sine * y]
+}
+
+#[test]
+fn a_block_on_a_turned_plane_slides_as_coulomb_says() {
+    let (sine, cosine) = 30.0_f64.to_radians().sin_cos();
+    let push = format!(
+        "[[loads]]\nname = 'push'\nkind = 'velocity'\nx = {:?}\ny = {:?}\n\
+         shape = {{ kind = 'rotated', centre = [1.5, 1], angle = 30, \
+         shape = {{ kind = 'box', min = [0.9, 1.1], max = [1.07, 1.6] }} }}",
+        0.02 * cosine,
+        0.02 * sine
+    );
+    for friction in [0.1, 0.3] {
+        let found = History::of_job("push", &on_plane(friction, 0.0, &push), &[]);
+        let [across, along] = on_plane_at_end(&found);
+        let pushed = found.last("load_push_x").mul_add(cosine, found.last("load_push_y") * sine);
+        println!("{friction}: {along:.2} N of {across:.2} N, push {pushed:.2} N");
+        assert!((along / across / friction - 1.0).abs() < 1e-3 && (pushed / along - 1.0).abs() < 1e-3);
+        let newton = found.column("newton_iterations");
+        assert!(newton.iter().all(|newton| *newton <= 12.0), "{newton:?}");
+    }
+}
+
+#[test]
+fn a_block_on_a_turned_plane_stands_within_the_angle_of_friction() {
+    let found = History::of_job("stands", &on_plane(0.3, 0.98 * 3.0, ""), &[]);
+    let [across, along] = on_plane_at_end(&found);
+    println!("{along:.2} N of {across:.2} N");
+    assert!((across / 5000.0 - 1.0).abs() < 1e-5 && (along / -1470.0 - 1.0).abs() < 1e-4, "{across} {along}");
+}
+
+/// A block in space between a plate that presses it by 4 % and a floor: with friction it needs a force between those
+/// on a smooth and on a sticky floor. What spreads slides inwards or outwards, in directions that are little known.
+#[test]
+fn a_pressed_block_spreads_against_friction() {
+    let job = |floor: &str| {
+        let job = format!(
+            r#"
+dimension = 3
+[domain]
+size = [0.5, 1, 0.5]
+root_edge = 0.5
+[boundaries]
+x_min.kind = "symmetric"
+y_min = {floor}
+z_min.kind = "symmetric"
+[tree]
+base_level = 0
+[[materials]]
+name = "rubber"
+density = 1000
+model = "hencky"
+young = 1e6
+poisson = 0.4
+[[bodies]]
+name = "block"
+material = "rubber"
+shape = {{ kind = "box", min = [0, 0, 0], max = [0.25, 0.25, 0.25] }}
+[[colliders]]
+name = "plate"
+shape = {{ kind = "half_space", point = [0, 0.25, 0], normal = [0, -1, 0] }}
+motion = {{ kind = "steady", velocity = [0, -0.01, 0] }}
+contact = {{ kind = "slip" }}
+"#
+        );
+        load_steps(&job, "step = 0.5")
+    };
+    let found = |floor: &str| History::of_job("spread", &job(floor), &[]);
+    let rough = found("{ kind = 'separating', friction = 0.2 }");
+    let newton = rough.column("newton_iterations");
+    assert!(newton.iter().all(|newton| *newton <= 12.0), "{newton:?}");
+    let [smooth, sticky] =
+        ["{ kind = 'slip' }", "{ kind = 'sticky' }"].map(|floor| found(floor).last("force_plate_y"));
+    let rough = rough.last("force_plate_y");
+    println!("{smooth:.1} N smooth, {rough:.1} N rough, {sticky:.1} N sticky");
+    assert!(1.01 * smooth < rough && rough < 0.99 * sticky, "{smooth} {rough} {sticky}");
+}
+
+/// In space: a block under a turned plate without friction, which presses it against a turned wall with friction, on
+/// two levels. A grip at its middle keeps it.
+#[test]
+fn friction_in_space_gives_the_same_on_any_ranks_and_across_restart() {
+    let job = r#"
+dimension = 3
+gravity = [0, -1, 0]
+[domain]
+size = [1, 1, 1]
+root_edge = 0.5
+[boundaries]
+x_min.kind = "slip"
+y_min.kind = "slip"
+z_min.kind = "slip"
+[tree]
+base_level = 0
+regions = [{ level = 1, shape = { kind = "box", min = [0, 0, 0], max = [0.5, 0.5, 0.5] } }]
+[[materials]]
+name = "rubber"
+density = 1000
+model = "hencky"
+young = 1e6
+poisson = 0.3
+[[bodies]]
+name = "block"
+material = "rubber"
+[bodies.shape]
+kind = "intersection"
+parts = [
+    { kind = "box", min = [0.25, 0, 0.25], max = [0.75, 0.6, 0.75] },
+    { kind = "half_space", point = [0.5, 0.5, 0.5], normal = [0.2, 1, 0.1] },
+]
+[[colliders]]
+name = "plate"
+shape = { kind = "half_space", point = [0.5, 0.5, 0.5], normal = [-0.2, -1, -0.1] }
+motion = { kind = "steady", velocity = [0, -0.004, 0] }
+contact = { kind = "slip" }
+[[colliders]]
+name = "wall"
+shape = { kind = "half_space", point = [0.75, 0.25, 0.5], normal = [-1, 0.1, 0.2] }
+contact = { kind = "separating", friction = 0.2 }
+[[loads]]
+name = "middle"
+kind = "velocity"
+x = 0
+z = 0
+shape = { kind = "box", min = [0.45, 0.2, 0.45], max = [0.55, 0.3, 0.55] }
+"#;
+    let job = load_steps(job, "step = 0.25\ntolerance = 1e-5") + CHECKPOINTS;
+    restart::assert_same_on_any_ranks(&job, "space", |directory: &Path, _| {
+        let found = History::read(directory, "space");
+        let rest = found.column("unbalanced_force");
+        assert!(rest.iter().all(|rest| *rest <= 1e-5), "{rest:?}");
+    });
+}
+
 /// A smooth wall that moves into soil bears Rankine's passive pressure, `γ H² K / 2 + 2 c H √K` with K = 3.
 #[test]
 fn a_wall_bears_the_passive_pressure_of_soil() {

@@ -71,6 +71,29 @@ fn memory_is_foretold() {
     assert!((0.7..1.4).contains(&ratio), "{foretold} MB, {ratio} of what it took");
 }
 
+/// A rank exchanges sums with its neighbours once for each linear iteration of a load step; beside these, for each
+/// Newton iteration and each time that nodes leave a wall, and for the particles.
+#[test]
+fn a_linear_iteration_has_one_exchange() {
+    let _turn = in_turn();
+    let (name, home) = ("load_steps_3d", tempfile::tempdir().expect("temporary directory"));
+    succeed(&mut run(home.path(), 3, 1, &job(name), &["--quiet"]));
+    let history = std::fs::read_to_string(file(home.path(), name, ".history.csv")).expect("history");
+    let rows: Vec<Vec<&str>> = history.lines().map(|line| line.split(',').collect()).collect();
+    let column = |name: &str| rows[0].iter().position(|cell| cell.starts_with(name)).expect("column");
+    let [newton, linear] = ["newton_iterations", "linear_iterations"].map(column);
+    let records = telemetry(home.path(), name);
+    let steps = records.iter().filter(|record| record["steps"] == 1);
+    for (row, record) in rows[2..].iter().zip(steps) {
+        let [newton, linear] = [newton, linear].map(|at| row[at].parse::<f64>().expect("a number"));
+        let [_, mean, most] = spread(record, "messages_per_step");
+        let neighbours = spread(record, "neighbours")[1];
+        let exchanges = mean / neighbours;
+        println!("{newton} Newton and {linear} linear iterations, {exchanges} exchanges, {most} messages");
+        assert!(exchanges <= linear + 4.0 * newton + 10.0, "{exchanges} exchanges");
+    }
+}
+
 /// Exchanges with neighbours in a step of an elastic body: sums at nodes, the well filled cells of ties, and
 /// particles.
 const EXCHANGES: f64 = 3.0;

@@ -74,3 +74,10 @@ fn more_ranks_than_leaves() {
     let _turn = in_turn();
     same_in_all_ways("few_leaves", &[(1, 1), (2, 1), (4, 2), (7, 1)]);
 }
+
+/// Newton's method and multigrid: every rank computes the same corrections.
+#[test]
+fn load_steps_in_space() {
+    let _turn = in_turn();
+    same_in_all_ways("load_steps_3d", &[(1, 1), (2, 1), (3, 1), (7, 1)]);
+}

@@ -70,7 +70,8 @@ pub(super) fn check<const D: usize>(checks: &mut Checks, file: &JobFile, problem
     for (i, collider) in problem.colliders.iter().enumerate() {
         let here = root.key("colliders").index(i);
         refuse(collider.free().is_some(), here.key("motion"), "a free body", "a prescribed motion");
-        refuse(has_shear(collider.contact), here.key("contact"), "friction, cohesion or drag", "none");
+        let shears = collider.contact.acts_by_area();
+        refuse(shears, here.key("contact"), "cohesion or drag", "friction alone");
         refuse(
             !collider.acts_on_nodes(),
             here.key("acts_on"),
@@ -96,9 +97,4 @@ pub(super) fn check<const D: usize>(checks: &mut Checks, file: &JobFile, problem
             }
         }
     }
-}
-
-/// Whether a surface brakes what slides along it.
-fn has_shear(contact: Contact) -> bool {
-    contact.acts_by_area() || matches!(contact, Contact::Separating { friction, .. } if friction > 0.0)
 }

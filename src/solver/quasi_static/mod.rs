@@ -200,9 +200,9 @@ impl<const D: usize> Solver<D> {
                 book(held.by, *number, along.map(|along| force * along));
             }
         }
-        let slides = |wall: &&Wall<D>| unknowns.owned[wall.node] && wall.push != [0.0; D];
-        for wall in unknowns.walls.iter().filter(slides) {
-            book(wall.by, wall.node, wall.push.map(|force| -dt * force));
+        let rubs = |wall: &&Wall<D>| unknowns.owned[wall.node] && wall.rubs();
+        for wall in unknowns.walls.iter().filter(rubs) {
+            book(wall.by, wall.node, wall.shear(&way[wall.node]).map(|force| -dt * force));
         }
         impulses
     }

@@ -8,7 +8,9 @@ use super::held::{Held, Wall};
 use super::multigrid::Multigrid;
 use super::points::{Points, Sweep};
 use super::unknowns::{Nodal, Unknowns};
+use super::walls::Springs;
 use crate::kernel::{Row, Scheme};
+use crate::solver::state::inside::dot;
 use crate::solver::state::{Effort, Solver};
 use crate::solver::step::p2g::scatter;
 
@@ -25,7 +27,7 @@ const FORCED: u32 = 3;
 const NEARLY_BALANCED: f64 = 1e-3;
 /// Tolerance of the first linear system, and the greatest of all.
 const FORCING: [f64; 2] = [1e-2, 0.1];
-/// Residual over the forces up to which nodes stick, slide or leave walls anew.
+/// Residual over the forces up to which nodes rub, or leave walls, anew.
 const SETTLES: f64 = 1e-2;
 /// Most times that they do in a step, and times after which only those do that are most wrong.
 const ROUNDS: u32 = 60;
@@ -38,7 +40,7 @@ pub(super) const MOST_WAY: f64 = 0.5;
 /// Displacements and forces at the end of an attempt.
 pub(super) struct Balance<const D: usize> {
     pub(super) effort: Effort,
-    /// How often nodes have begun to stick, to slide, or to leave walls.
+    /// How often nodes have begun to touch or to leave walls.
     pub(super) rounds: u32,
     /// Displacements of all nodes, m.
     pub(super) way: Nodal<D>,
@@ -84,11 +86,17 @@ impl<const D: usize> Solver<D> {
         let (leaves, grid) = ((&self.forest, &self.chunks[..]), (&self.grid.plan, &self.physics.scheme()));
         let mut multigrid = Multigrid::new(&self.comm, leaves, grid, unknowns);
         let [has_walls, has_friction] = {
-            let brakes = |wall: &Wall<D>| wall.friction > 0.0;
+            let brakes = |wall: &Wall<D>| wall.friction.coefficient > 0.0;
             [!unknowns.walls.is_empty(), unknowns.walls.iter().any(brakes)].map(|has| self.comm.any(has))
         };
-        let mut pulls = outer.clone();
         let Some(mut now) = self.iterate(unknowns, &mut points, outer, zero, dt) else { return Err(effort) };
+        if has_friction {
+            unknowns.set_springs(&now.stiffness);
+            let Some(next) = self.iterate(unknowns, &mut points, outer, now.way, dt) else {
+                return Err(effort);
+            };
+            now = next;
+        }
         let mut forcing = FORCING[0];
         // A search for a factor of safety looks for steps that fail.
         let mut forced = if self.physics.reduction.is_some() { FORCED } else { 0 };
@@ -105,7 +113,7 @@ impl<const D: usize> Solver<D> {
             {
                 let slack = now.norm.max(SLACK * tolerance * now.greatest);
                 let share = if rounds < FREELY { 0.0 } else { 0.5 };
-                let forces = (&now.way, &now.rest);
+                let forces = (&mut now.way, &now.rest);
                 is_other = unknowns.settle_walls(&self.comm, forces, &now.stiffness, (slack, share));
                 is_other = self.comm.any(is_other);
                 if is_other {
@@ -117,9 +125,7 @@ impl<const D: usize> Solver<D> {
                     held_is_reached = !self.comm.any(unknowns.is_off(&now.way));
                 }
                 if is_other || has_friction {
-                    pulls.clone_from(outer);
-                    unknowns.add_friction(&mut pulls);
-                    let next = self.iterate(unknowns, &mut points, &pulls, now.way, dt);
+                    let next = self.iterate(unknowns, &mut points, outer, now.way, dt);
                     let Some(next) = next else { return Err(effort) };
                     now = next;
                     effort.residual = now.residual();
@@ -141,9 +147,16 @@ impl<const D: usize> Solver<D> {
             (effort.newton, since) = (effort.newton + 1, since + 1);
             let enough = if now.norm > 0.0 { 0.3 * tolerance * now.greatest / now.norm } else { 0.0 };
             let target = forcing.max(enough.min(0.5));
-            multigrid.assemble(&self.comm, &points, &now.stiffness, unknowns);
-            let correction =
-                self.correct(unknowns, &mut points, &multigrid, &now, target, held_is_reached, &mut effort);
+            let springs = has_friction.then(|| unknowns.springs(&now.way));
+            multigrid.assemble(&self.comm, &points, (&now.stiffness, springs.as_ref()), unknowns);
+            let correction = self.correct(
+                unknowns,
+                &mut points,
+                (&multigrid, springs),
+                &now,
+                (target, held_is_reached),
+                &mut effort,
+            );
             let (slope, mut share): (f64, f64) =
                 (unknowns.products(&self.comm, [(&correction, &now.free)])[0], 1.0);
             let (mut halvings, mut is_forced) = (0, false);
@@ -154,7 +167,7 @@ impl<const D: usize> Solver<D> {
                     .zip(&correction)
                     .map(|(way, more)| std::array::from_fn(|a| share.mul_add(more[a], way[a])))
                     .collect();
-                let next = self.iterate(unknowns, &mut points, &pulls, way, dt);
+                let next = self.iterate(unknowns, &mut points, outer, way, dt);
                 if let Some(next) = next {
                     // Where displacements are prescribed the first correction raises the forces from nothing.
                     let is_less = next.norm < (1.0 - 1e-4 * share) * now.norm;
@@ -210,11 +223,11 @@ impl<const D: usize> Solver<D> {
         let mut stiffness: Vec<f64> = Vec::with_capacity(way.len());
         let mut rest = self.forces(unknowns, |row, cell| stiffness.push(row / (cell * cell)));
         unknowns.gather_stiffness(&mut stiffness);
-        let mut inner = rest.clone();
-        for (rest, outer) in rest.iter_mut().zip(outer) {
+        let (mut inner, mut outer) = (rest.clone(), outer.clone());
+        unknowns.add_friction(&way, &mut outer);
+        for (rest, outer) in rest.iter_mut().zip(&outer) {
             (0..D).for_each(|a| rest[a] += outer[a]);
         }
-        let mut outer = outer.clone();
         [&mut rest, &mut inner, &mut outer].into_iter().for_each(|forces| unknowns.gather_ties(forces));
         let mut free = rest.clone();
         unknowns.mask(&mut free);
@@ -252,14 +265,23 @@ impl<const D: usize> Solver<D> {
     }
 
     /// Collective over neighbours. What stress takes from the forces on nodes if they move a little further:
-    /// the stiffness times the displacements.
-    fn resistance(&mut self, unknowns: &Unknowns<D>, points: &mut [Vec<Points>], way: &Nodal<D>) -> Nodal<D> {
+    /// the stiffness times the displacements, with that of friction.
+    fn resistance(
+        &mut self,
+        unknowns: &Unknowns<D>,
+        points: &mut [Vec<Points>],
+        springs: &[(usize, [[f64; D]; D])],
+        way: &Nodal<D>,
+    ) -> Nodal<D> {
         let mut way = way.clone();
         unknowns.spread_ties(&mut way);
         self.show(unknowns, &way);
         self.stress_of_displacements(points, Sweep::Change);
         let mut forces = self.forces(unknowns, |_, _| ());
         forces.iter_mut().flatten().for_each(|force| *force = -*force);
+        for (node, spring) in springs {
+            (0..D).for_each(|a| forces[*node][a] += dot(&spring[a], &way[*node]));
+        }
         unknowns.gather_ties(&mut forces);
         unknowns.mask(&mut forces);
         forces
@@ -272,17 +294,17 @@ impl<const D: usize> Solver<D> {
         &mut self,
         unknowns: &Unknowns<D>,
         points: &mut [Vec<Points>],
-        multigrid: &Multigrid<D>,
+        (multigrid, springs): (&Multigrid<D>, Option<Springs<D>>),
         now: &Iterate<D>,
-        target: f64,
-        held_is_reached: bool,
+        (target, held_is_reached): (f64, bool),
         effort: &mut Effort,
     ) -> Nodal<D> {
+        let springs = springs.as_deref().unwrap_or_default();
         let mut correction = vec![[0.0; D]; unknowns.nodes.len()];
         let mut rest = now.free.clone();
         if !held_is_reached {
             correction = unknowns.way_to_held(&now.way);
-            let taken = self.resistance(unknowns, points, &correction);
+            let taken = self.resistance(unknowns, points, springs, &correction);
             subtract(&mut rest, &taken, 1.0);
         }
         let norm = match held_is_reached {
@@ -295,7 +317,7 @@ impl<const D: usize> Solver<D> {
         let mut towards = multigrid.towards(&self.comm, unknowns, &rest, norm);
         let mut way = towards.way.clone();
         for _ in 0..LINEAR {
-            let taken = self.resistance(unknowns, points, &way);
+            let taken = self.resistance(unknowns, points, springs, &way);
             let curvature = unknowns.products(&self.comm, [(&way, &taken)])[0];
             let is_convex = curvature > 0.0 && towards.product > 0.0;
             if !is_convex {

@@ -122,6 +122,17 @@ impl<const D: usize> Unknowns<D> {
         &self.ties
     }
 
+    /// What a node follows: itself, or its corners with shares that bound a stiffness at it.
+    pub(super) fn leaders(&self, node: usize) -> Vec<(usize, f64)> {
+        match self.ties.iter().find(|(tied, _)| *tied == node) {
+            None => vec![(node, 1.0)],
+            Some((_, corners)) => {
+                let all: f64 = corners.iter().map(|(_, weight)| weight.abs()).sum();
+                corners.iter().map(|&(corner, weight)| (corner, all * weight.abs())).collect()
+            }
+        }
+    }
+
     /// Shares a force on tied nodes out to their corners.
     pub(super) fn gather_ties(&self, forces: &mut [[f64; D]]) {
         for (node, corners) in &self.ties {

@@ -1,18 +1,20 @@
 //! Walls along which material slides, or which it may leave: what they hold of the nodes.
 //!
 //! A wall holds a node on it or inside it along its normal n, `n·u = n·s`, with its own displacement s. One
-//! that separates does so only while it presses, and friction holds all of the displacement, with a force of
-//! at most μ N (Coulomb). Which of these is so is found as the iteration goes on (an active set): each step
-//! begins with all nodes held; a node that is pulled leaves, one that comes too near is held again, one
-//! whose force is too great slides, and one that slides back with its friction sticks. After some rounds only
-//! nodes that are most wrong change, lest they go in circles. The friction of nodes
-//! that slide is that of the normal force before, so the stiffness stays symmetric.
+//! that separates does so only while it presses. Which of these is so is found as the iteration goes on (an
+//! active set): each step begins with all nodes held; a node that is pulled leaves, one that comes too near is
+//! held again. After some rounds only nodes that are most wrong change, lest they go in circles.
+//!
+//! Friction is the force of a stiff spring along the wall, of at most μ N (Coulomb), with its tangent in
+//! Newton's matrix. In each round it begins anew from the force that it has, under the normal force N of the
+//! round before, so the slip of what sticks goes to 0 (augmented Lagrangian; Simo and Laursen 1992) and
+//! the stiffness stays symmetric.
 //!
 //! Conditions that are not along axes are kept as unit vectors at right angles to each other, and taken out
 //! of displacements and forces by projection.
 use partition::comm::Comm;
 
-use super::held::{Along, Held, Holder, Next, State, Wall, axis, without};
+use super::held::{Along, Held, Holder, State, Wall, axis, without};
 use super::unknowns::{Nodal, Unknowns};
 use crate::solver::state::inside::dot;
 
@@ -20,6 +22,13 @@ use crate::solver::state::inside::dot;
 const SAME: f64 = 1e-9;
 /// Part of a unit vector beside those that hold a node already from which it is another condition.
 const OTHER: f64 = 0.05;
+
+/// Stiffness of the springs of friction over that of their nodes. In each round the slip of what sticks falls by
+/// about this; much stiffer springs let Newton's method go in circles between nodes that stick and slide.
+const SPRING: f64 = 10.0;
+
+/// Tangents of friction by node, N/m.
+pub(super) type Springs<const D: usize> = Vec<(usize, [[f64; D]; D])>;
 
 /// Conditions of a node, at right angles to each other.
 struct Frame<const D: usize> {
@@ -92,11 +101,6 @@ impl<const D: usize> Unknowns<D> {
                     continue;
                 }
                 wall.along = frame.add(&wall.normal, &wall.way, wall.by).unwrap_or([0.0; D]);
-                if wall.state == State::Sticks {
-                    for a in 0..D {
-                        let _ = frame.add(&axis(a), &wall.way, wall.by);
-                    }
-                }
             }
             let (held, turned) = frame.split(&self.fixed[node]);
             self.held[node] = held;
@@ -113,44 +117,66 @@ impl<const D: usize> Unknowns<D> {
     pub(super) fn settle_walls(
         &mut self,
         comm: &Comm,
-        (way, rest): (&Nodal<D>, &Nodal<D>),
+        (way, rest): (&mut Nodal<D>, &Nodal<D>),
         stiffness: &[f64],
         (slack, share): (f64, f64),
     ) -> bool {
         let next = |wall: &Wall<D>| {
-            let (node, fixed) = (wall.node, &self.fixed[wall.node]);
-            let free = |v: [f64; D]| std::array::from_fn(|a| if fixed[a].is_some() { 0.0 } else { v[a] });
+            let node = wall.node;
             let least = SAME * self.cells[node];
             let near = if stiffness[node] > 0.0 { (slack / stiffness[node]).max(least) } else { least };
-            wall.next(&way[node], &rest[node], (near, slack), free)
+            wall.next(&way[node], &rest[node], (near, slack))
         };
-        let all: Vec<Next<D>> = self.walls.iter().map(next).collect();
-        let wrong =
-            |(wall, next): (&Wall<D>, &Next<D>)| if wall.state == next.state { 0.0 } else { next.excess };
-        let most = comm.max_f64(self.walls.iter().zip(&all).map(wrong).fold(0.0, f64::max));
-        let mut is_other = false;
-        for (wall, next) in self.walls.iter_mut().zip(&all) {
-            if wall.state == next.state {
-                wall.push = next.push;
-            } else if next.excess >= share * most {
-                (wall.state, wall.push) = (next.state, next.push);
+        let all: Vec<(State, f64)> = self.walls.iter().map(next).collect();
+        let most = comm.max_f64(all.iter().map(|(_, excess)| *excess).fold(0.0, f64::max));
+        let (mut is_other, mut back) = (false, Vec::new());
+        for (wall, (state, excess)) in self.walls.iter_mut().zip(all) {
+            if wall.state == state {
+                let slip = wall.settle(&way[wall.node], &rest[wall.node]);
+                back.push((wall.node, slip));
+            } else if excess >= share * most {
+                wall.change(state);
                 is_other = true;
+            }
+        }
+        for (node, slip) in back {
+            let held = self.along_turned(node, &slip);
+            for a in (0..D).filter(|&a| self.held[node][a].is_none()) {
+                way[node][a] -= slip[a] - held[a];
             }
         }
         is_other
     }
 
-    /// Adds the friction of nodes that slide.
-    pub(super) fn add_friction(&self, forces: &mut Nodal<D>) {
-        for wall in &self.walls {
-            (0..D).for_each(|a| forces[wall.node][a] += wall.push[a]);
+    /// Gives friction its springs, from the stiffness of the nodes, N/m; that of a tied node is its corners'.
+    pub(super) fn set_springs(&mut self, stiffness: &[f64]) {
+        let mut own = stiffness.to_vec();
+        for (node, corners) in self.ties() {
+            own[*node] = corners.iter().map(|(corner, _)| stiffness[*corner]).fold(0.0, f64::max);
         }
+        for wall in &mut self.walls {
+            wall.friction.spring = SPRING * own[wall.node];
+        }
+    }
+
+    /// Adds friction at these displacements (m) to forces, N.
+    pub(super) fn add_friction(&self, way: &Nodal<D>, forces: &mut Nodal<D>) {
+        for wall in self.walls.iter().filter(|wall| wall.rubs()) {
+            let shear = wall.shear(&way[wall.node]);
+            (0..D).for_each(|a| forces[wall.node][a] += shear[a]);
+        }
+    }
+
+    /// Its tangents at these displacements (m) by node, N/m.
+    pub(super) fn springs(&self, way: &Nodal<D>) -> Springs<D> {
+        let rub = self.walls.iter().filter(|wall| wall.rubs());
+        rub.map(|wall| (wall.node, wall.tangent(&way[wall.node]))).collect()
     }
 
     /// Whether any node of this rank slides against friction, and whether friction holds any.
     pub(super) fn slides(&self) -> [bool; 2] {
-        let has = |state: State| self.walls.iter().any(|wall| wall.friction > 0.0 && wall.state == state);
-        [has(State::Slides), has(State::Sticks)]
+        [true, false]
+            .map(|slides| self.walls.iter().any(|wall| wall.rubs() && wall.friction.slides == slides))
     }
 
     /// Way to the prescribed displacements; 0 for directions that are free.

@@ -36,6 +36,7 @@ use self::lattice::{Lattice, Mesh};
 use self::skyline::Skyline;
 use super::points::Points;
 use super::unknowns::{Nodal, Unknowns};
+use super::walls::Springs;
 use crate::exact_sum::ExactSum;
 use crate::grid::plan::GridPlan;
 use crate::kernel::Scheme;
@@ -95,13 +96,13 @@ impl<const D: usize> Multigrid<D> {
         Self { bricks, corners, maps, turned, levels, bottom: Skyline::default(), numbers }
     }
 
-    /// Collective, with three reductions. The matrices, from the tangents of the particles and the stiffness
-    /// of nodes (N/m).
+    /// Collective, with three reductions. The matrices, from the tangents of the particles, the stiffness of
+    /// nodes (N/m), and springs at nodes where any rank has some.
     pub(super) fn assemble(
         &mut self,
         comm: &Comm,
         points: &[Vec<Points>],
-        stiffness: &[f64],
+        (stiffness, springs): (&[f64], Option<&Springs<D>>),
         unknowns: &Unknowns<D>,
     ) {
         self.bricks.collect(comm, points);
@@ -135,17 +136,36 @@ impl<const D: usize> Multigrid<D> {
                 }
             }
         }
-        let mut sums = vec![0_i64; matrix.len()];
+        // Of each unknown its stiffness, and the sum of its springs.
+        let words = if springs.is_some() { 1 + D * D } else { 1 };
+        let mut sums = vec![0_i64; words * matrix.len()];
         for (node, &number) in self.numbers.iter().enumerate().filter(|(_, number)| **number != NONE) {
             if unknowns.owned[node] {
-                sums[number as usize] += (stiffness[node] * unit) as i64;
+                sums[words * number as usize] += (stiffness[node] * unit) as i64;
+            }
+        }
+        for (node, spring) in springs.into_iter().flatten().filter(|(node, _)| unknowns.owned[*node]) {
+            for (leader, share) in unknowns.leaders(*node) {
+                let Some(number) = self.numbers.get(leader).filter(|number| **number != NONE) else {
+                    continue;
+                };
+                let own = &mut sums[words * *number as usize + 1..][..D * D];
+                for (sum, value) in own.iter_mut().zip(spring.as_flattened()) {
+                    *sum += (share * value * unit) as i64;
+                }
             }
         }
         comm.sum_i64(&mut sums);
-        for (node, sum) in sums.into_iter().enumerate() {
+        for (node, sums) in sums.chunks_exact(words).enumerate() {
             let Some(block) = matrix.block(node, node as u32) else { continue };
             for a in (0..D).filter(|a| held[node] >> a & 1 == 0) {
-                block[a][a] = block[a][a].max(FLOOR * sum as f64 / unit);
+                block[a][a] = block[a][a].max(FLOOR * sums[0] as f64 / unit);
+            }
+            if words > 1 {
+                let mut spring: [[f64; D]; D] =
+                    std::array::from_fn(|i| std::array::from_fn(|k| sums[1 + D * i + k] as f64 / unit));
+                without_held(&mut spring, held[node], held[node]);
+                add(block, 1.0, &spring);
             }
         }
         for &(node, along) in &self.turned {
