@@ -12,9 +12,7 @@ pub(crate) fn section(runs: &Runs, page: &mut Page) {
          As above, in the plane of radius and height. A half plane has one axis less in which coarse cells save than space has.\n",
     );
     let scenes = [cavity(runs), rod(runs), cone(runs)];
-    for (scene, gain) in scenes.iter().zip(table(page, &scenes)) {
-        page.line(&format!("cost_of_rings.{}", scene.id), gain);
-    }
+    let _ = table(page, &scenes);
     for scene in &scenes {
         scene.curves(page);
     }
@@ -79,8 +77,9 @@ fn cavity(runs: &Runs) -> Scene {
     Scene {
         id: "cavity_rings",
         name: "cylindrical cavity in clay, by load steps: its pressure from 1.25 of its first radius on",
-        uniform: (0..=2).map(|level| run(level, false)).collect(),
-        refined: (1..=3).map(|level| run(level, true)).collect(),
+        // With 8 cells over the radius and this Poisson's ratio there is no equilibrium beyond t = 2.6 s.
+        uniform: (0..=1).map(|level| run(level, false)).collect(),
+        refined: vec![run(1, true)],
         bound: "a slice is refined along its height as well, where nothing changes",
     }
 }
@@ -134,7 +133,7 @@ fn cone(runs: &Runs) -> Scene {
         id: "cone_rings",
         name: "cone in clay: its steady resistance",
         uniform: (3..=4).map(|level| run(level, false)).collect(),
-        refined: (3..=5).map(|level| run(level, true)).collect(),
+        refined: (3..=4).map(|level| run(level, true)).collect(),
         bound: "nothing but the clay far away: what flows is a few radii about the tip",
     }
 }
