@@ -8,6 +8,14 @@ use crate::common::launch::{run, text};
 use crate::common::load_steps::{CHECKPOINTS, load_steps};
 use crate::common::restart;
 
+const RUBBER: &str = r#"[[materials]]
+name = "rubber"
+density = 1000
+model = "hencky"
+young = 1e6
+poisson = 0.3
+"#;
+
 /// A block of 1 m between a floor and a plate that presses it by 2 mm, all turned about (1, 1) by an angle.
 /// A grip at its middle keeps it from sliding away.
 fn press(degrees: f64, contact: &str) -> String {
@@ -28,13 +36,7 @@ y_min.kind = "slip"
 y_max.kind = "slip"
 [tree]
 base_level = 3
-[[materials]]
-name = "rubber"
-density = 1000
-model = "hencky"
-young = 1e6
-poisson = 0.3
-[[bodies]]
+{RUBBER}[[bodies]]
 name = "block"
 material = "rubber"
 [bodies.shape]
@@ -111,13 +113,7 @@ y_min = {floor}
 y_max.kind = "slip"
 [tree]
 base_level = 2
-[[materials]]
-name = "rubber"
-density = 1000
-model = "hencky"
-young = 1e6
-poisson = 0.3
-[[bodies]]
+{RUBBER}[[bodies]]
 name = "block"
 material = "rubber"
 shape = {{ kind = "box", min = [0.5, 0], max = [1.5, 0.5] }}
@@ -230,8 +226,8 @@ shape = {{ kind = "box", min = [0.99, 0.95], max = [1.01, 1.02] }}
     });
 }
 
-/// An elastic block of 500 kg on a collider with friction that is turned about (1.5, 1) by 30°, not on nodes. Gravity
-/// is 10 m/s² onto it and, growing to this at 1 s, so much along it, m/s².
+/// An elastic block of 500 kg on a collider with friction that is turned about (1.5, 1) by 30°, not on nodes.
+/// Gravity is 10 m/s² onto it and, growing to this at 1 s, so much along it, m/s².
 fn on_plane(friction: f64, along: f64, loads: &str) -> String {
     let (sine, cosine) = 30.0_f64.to_radians().sin_cos();
     let gravity = |way: f64| [10.0 * sine - way * cosine, -10.0 * cosine - way * sine];
@@ -250,13 +246,7 @@ y_min.kind = "slip"
 y_max.kind = "slip"
 [tree]
 base_level = 2
-[[materials]]
-name = "rubber"
-density = 1000
-model = "hencky"
-young = 1e6
-poisson = 0.3
-[[bodies]]
+{RUBBER}[[bodies]]
 name = "block"
 material = "rubber"
 [bodies.shape]
@@ -311,8 +301,8 @@ fn a_block_on_a_turned_plane_stands_within_the_angle_of_friction() {
     assert!((across / 5000.0 - 1.0).abs() < 1e-5 && (along / -1470.0 - 1.0).abs() < 1e-4, "{across} {along}");
 }
 
-/// A block in space between a plate that presses it by 4 % and a floor: with friction it needs a force between those
-/// on a smooth and on a sticky floor. What spreads slides inwards or outwards, in directions that are little known.
+/// A block in space between a plate that presses it by 4 % and a floor: with friction it needs a force between
+/// those on a smooth and on a sticky floor. Nodes slide inwards or outwards, in directions that are little known.
 #[test]
 fn a_pressed_block_spreads_against_friction() {
     let job = |floor: &str| {
@@ -358,8 +348,8 @@ contact = {{ kind = "slip" }}
     assert!(1.01 * smooth < rough && rough < 0.99 * sticky, "{smooth} {rough} {sticky}");
 }
 
-/// In space: a block under a turned plate without friction, which presses it against a turned wall with friction, on
-/// two levels. A grip at its middle keeps it.
+/// In space, on two levels: a block under a turned plate without friction, which presses it against a turned
+/// wall with friction. A grip at its middle keeps it.
 #[test]
 fn friction_in_space_gives_the_same_on_any_ranks_and_across_restart() {
     let job = r#"

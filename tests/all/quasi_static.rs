@@ -261,7 +261,8 @@ fn load_steps_in_space_give_the_same_on_any_ranks() {
     });
 }
 
-/// On three levels that meet the surface, nearly incompressible: with nodes of next to no material free it takes 70.
+/// On three levels that meet the surface, nearly incompressible: it takes 70 if nodes of next to no material
+/// are free.
 #[test]
 fn nearly_incompressible_slopes_in_space_take_few_iterations_on_three_levels() {
     let regions = "tree.regions=[{ level = 2, shape = { kind = 'box', min = [0.2, 0.3, 0.2], max = [0.6, 0.6, 0.6] } }, \

@@ -122,7 +122,7 @@ impl<const D: usize> Unknowns<D> {
         &self.ties
     }
 
-    /// What a node follows: itself, or its corners with shares that bound a stiffness at it.
+    /// The node itself, or the corners that it follows, with shares that bound a stiffness at it.
     pub(super) fn leaders(&self, node: usize) -> Vec<(usize, f64)> {
         match self.ties.iter().find(|(tied, _)| *tied == node) {
             None => vec![(node, 1.0)],

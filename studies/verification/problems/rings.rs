@@ -12,7 +12,7 @@ pub(crate) fn section(runs: &Runs, page: &mut Page) {
          As above, in the plane of radius and height. A half plane has one axis less in which coarse cells save than space has.\n",
     );
     let scenes = [cavity(runs), rod(runs), cone(runs)];
-    let _ = table(page, &scenes);
+    table(page, &scenes);
     for scene in &scenes {
         scene.curves(page);
     }

@@ -136,7 +136,7 @@ pub(in crate::solver::step) fn obey<const D: usize>(
     Some(std::array::from_fn(|a| row.0[3] * (before[a] - row.0[a])))
 }
 
-/// What the sums at the nodes of a velocity field tell.
+/// Use of the sums at the nodes of a velocity field.
 #[derive(Clone, Copy)]
 struct Known {
     /// Number of the field.
