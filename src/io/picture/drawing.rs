@@ -1,9 +1,9 @@
 //! Input of a picture.
 use super::camera::Bounds;
+use super::layers::solids::Solid;
+use super::layers::vectors::Vectors;
 use super::scene::Splat;
-use super::solids::Solid;
 use super::tint::Tint;
-use super::vectors::Vectors;
 
 /// The particles of one rank and what all ranks know.
 #[derive(Debug)]

@@ -2,8 +2,8 @@
 use std::ops::RangeInclusive;
 
 use super::camera::{Bounds, Camera};
-use super::canvas::Canvas;
-use super::colour::{Map, Paper, Rgb, class};
+use super::paper::canvas::Canvas;
+use super::paper::colour::{Map, Paper, Rgb, class};
 use super::tint::Tint;
 use crate::text::{number, without_zeros};
 

@@ -1,9 +1,9 @@
 //! Depth buffer and shading.
 
 use super::camera::{Bounds, Camera};
-use super::canvas::Canvas;
-use super::colour::{Paper, Rgb, mixed, scaled};
-use super::solids::Layer;
+use super::layers::solids::Layer;
+use super::paper::canvas::Canvas;
+use super::paper::colour::{Paper, Rgb, mixed, scaled};
 
 /// Radius of balls over the half width of the particles' boxes, so that no gaps are seen between them.
 pub(super) const LARGER: f64 = 1.2;

@@ -1,6 +1,6 @@
 //! Options of a picture.
 use super::camera::{View as Direction, numbers};
-use super::colour::{DARK, LIGHT, Map, Paper};
+use super::paper::colour::{DARK, LIGHT, Map, Paper};
 use crate::io::revolve::Revolve;
 
 /// Options of a picture.

@@ -1,5 +1,8 @@
-use super::colour::LIGHT;
-use super::scales::short;
+use super::camera::Camera;
+use super::paper::canvas::Canvas;
+use super::paper::colour::LIGHT;
+use super::scales::{nice, short};
+use super::scene::Raster;
 use super::*;
 use crate::io::snapshot::Scalars;
 use crate::particle::chunk::Chunk;

@@ -1,11 +1,11 @@
 //! Vectors as arrows on a lattice of the picture, with an arrow beside them for their scale.
-use super::camera::Camera;
-use super::canvas::Canvas;
-use super::colour::Rgb;
-use super::drawing::Drawing;
-use super::scales::{self, nice, short};
-use super::scene::Splat;
-use super::settings::Settings;
+use crate::io::picture::camera::Camera;
+use crate::io::picture::drawing::Drawing;
+use crate::io::picture::paper::canvas::Canvas;
+use crate::io::picture::paper::colour::Rgb;
+use crate::io::picture::scales::{self, nice, short};
+use crate::io::picture::scene::Splat;
+use crate::io::picture::settings::Settings;
 
 /// Pixels between arrows.
 const SPACING: f64 = 26.0;
@@ -24,7 +24,7 @@ struct Mean {
 
 impl Drawing {
     /// Draws the arrows of the visible particles.
-    pub(super) fn arrows(
+    pub(in crate::io::picture) fn arrows(
         &self,
         canvas: &mut Canvas,
         camera: &Camera,
@@ -66,7 +66,7 @@ impl Drawing {
     }
 
     /// The arrow of the scale.
-    pub(super) fn arrow_of_scale(&self, canvas: &mut Canvas, settings: &Settings) {
+    pub(in crate::io::picture) fn arrow_of_scale(&self, canvas: &mut Canvas, settings: &Settings) {
         let longest = settings.longest.unwrap_or_else(|| self.vectors.longest());
         if self.vectors.each.is_empty() || longest <= 0.0 {
             return;

@@ -1,9 +1,9 @@
 //! Copies of what is drawn: images behind planes of symmetry, and bodies of revolution in space.
 
-use super::camera::Bounds;
-use super::drawing::Drawing;
-use super::scene::{LARGER, Splat};
-use super::settings::Settings;
+use crate::io::picture::camera::Bounds;
+use crate::io::picture::drawing::Drawing;
+use crate::io::picture::scene::{LARGER, Splat};
+use crate::io::picture::settings::Settings;
 use crate::io::revolve::{self, Revolve};
 use crate::io::snapshot::Header;
 
@@ -12,7 +12,7 @@ impl Drawing {
     ///
     /// # Errors
     /// In words: see [`revolve::copies`].
-    pub(super) fn revolved(self, header: &Header, revolve: Revolve) -> Result<Self, String> {
+    pub(in crate::io::picture) fn revolved(self, header: &Header, revolve: Revolve) -> Result<Self, String> {
         let Self { splats, mut vectors, domain: Bounds { low, high }, .. } = self;
         let sections = splats.iter().map(|splat| (splat.position[0], splat.radii[0] / LARGER));
         let copies = revolve::copies(header, sections, revolve)?;
@@ -30,7 +30,7 @@ impl Drawing {
     }
 
     /// Adds the mirror images behind planes of symmetry. Returns the frame of all.
-    pub(super) fn mirror(&mut self, settings: &Settings, mut frame: Bounds) -> Bounds {
+    pub(in crate::io::picture) fn mirror(&mut self, settings: &Settings, mut frame: Bounds) -> Bounds {
         for axis in (0..3).filter(|&axis| settings.mirror[axis]) {
             let plane = self.domain.low[axis];
             let behind: Vec<Splat> = self

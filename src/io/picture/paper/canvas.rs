@@ -6,9 +6,9 @@ use std::path::Path;
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD as BASE64;
 
-use super::colour::Rgb;
-use super::font;
 use crate::io::hdf5_file::FileError;
+use crate::io::picture::paper::colour::Rgb;
+use crate::io::picture::paper::font;
 use crate::io::whole_file::write_whole;
 use crate::text::{html, printable};
 
@@ -18,7 +18,7 @@ fn hex([red, green, blue]: Rgb) -> String {
 }
 
 /// An image.
-pub(super) struct Canvas {
+pub(in crate::io::picture) struct Canvas {
     pub width: usize,
     pub height: usize,
     /// Pixels of a unit of the layout, in which sizes of letters and margins are given.
@@ -30,27 +30,27 @@ pub(super) struct Canvas {
 
 impl Canvas {
     /// A canvas of one colour.
-    pub(super) fn new([width, height]: [usize; 2], unit: f64, colour: Rgb) -> Self {
+    pub(in crate::io::picture) fn new([width, height]: [usize; 2], unit: f64, colour: Rgb) -> Self {
         Self { width, height, unit, pixels: colour.repeat(width * height), marks: None }
     }
 
     /// Pixels of a length of the layout.
-    pub(super) fn px(&self, length: f64) -> i64 {
+    pub(in crate::io::picture) fn px(&self, length: f64) -> i64 {
         (length * self.unit).round() as i64
     }
 
     /// Red, green and blue of each pixel, row by row.
-    pub(super) fn into_pixels(self) -> Vec<u8> {
+    pub(in crate::io::picture) fn into_pixels(self) -> Vec<u8> {
         self.pixels
     }
 
     /// From here on rectangles, texts and polygons are kept as elements of SVG; earlier ones stay pixels.
-    pub(super) fn collect(&mut self) {
+    pub(in crate::io::picture) fn collect(&mut self) {
         self.marks = Some(String::new());
     }
 
     /// Colours a pixel; places outside are ignored.
-    pub(super) fn set(&mut self, x: i64, y: i64, colour: Rgb) {
+    pub(in crate::io::picture) fn set(&mut self, x: i64, y: i64, colour: Rgb) {
         if (0..self.width as i64).contains(&x) && (0..self.height as i64).contains(&y) {
             let at = 3 * (y as usize * self.width + x as usize);
             self.pixels[at..at + 3].copy_from_slice(&colour);
@@ -59,13 +59,13 @@ impl Canvas {
 
     /// Colour of a pixel.
     #[cfg(test)]
-    pub(super) fn pixel(&self, x: usize, y: usize) -> Rgb {
+    pub(in crate::io::picture) fn pixel(&self, x: usize, y: usize) -> Rgb {
         let at = 3 * (y * self.width + x);
         [self.pixels[at], self.pixels[at + 1], self.pixels[at + 2]]
     }
 
     /// Fills a rectangle.
-    pub(super) fn fill(&mut self, x: i64, y: i64, width: i64, height: i64, colour: Rgb) {
+    pub(in crate::io::picture) fn fill(&mut self, x: i64, y: i64, width: i64, height: i64, colour: Rgb) {
         if let Some(marks) = &mut self.marks {
             let colour = hex(colour);
             let _ = writeln!(
@@ -80,7 +80,7 @@ impl Canvas {
     }
 
     /// Writes a text with the upper left corner of its capitals at `(x, y)`; they are `7 size` units high.
-    pub(super) fn text(&mut self, x: i64, y: i64, size: f64, text: &str, colour: Rgb) {
+    pub(in crate::io::picture) fn text(&mut self, x: i64, y: i64, size: f64, text: &str, colour: Rgb) {
         let (text, size) = (&printable(text), size * self.unit);
         if let Some(marks) = &mut self.marks {
             let (base, em, colour) = (y + font::cap_height(size), font::em(size), hex(colour));
@@ -95,12 +95,12 @@ impl Canvas {
     }
 
     /// Pixels that a text is wide.
-    pub(super) fn text_width(&self, size: f64, text: &str) -> i64 {
+    pub(in crate::io::picture) fn text_width(&self, size: f64, text: &str) -> i64 {
         font::draw(size * self.unit, text, |_, _, _| ())
     }
 
     /// A text of at most `width` pixels: an ellipsis replaces the part that does not fit.
-    pub(super) fn shortened(&self, size: f64, text: &str, width: i64) -> String {
+    pub(in crate::io::picture) fn shortened(&self, size: f64, text: &str, width: i64) -> String {
         let text = printable(text);
         match font::fitting(size * self.unit, &text, width) {
             (_, true) => text.into_owned(),
@@ -113,7 +113,13 @@ impl Canvas {
 
     /// A text in at most `most` lines of at most `width` pixels: broken between words, and within words that
     /// are wider than a line. An ellipsis replaces the part that does not fit.
-    pub(super) fn lines(&self, size: f64, text: &str, width: i64, most: usize) -> Vec<String> {
+    pub(in crate::io::picture) fn lines(
+        &self,
+        size: f64,
+        text: &str,
+        width: i64,
+        most: usize,
+    ) -> Vec<String> {
         // Wide gaps between words stay, as they separate groups.
         let text = text.trim().replace(['\n', '\r', '\t'], " ");
         let text = printable(&text);
@@ -135,7 +141,7 @@ impl Canvas {
     }
 
     /// Fills a polygon with smooth edges.
-    pub(super) fn polygon(&mut self, corners: &[[f64; 2]], colour: Rgb) {
+    pub(in crate::io::picture) fn polygon(&mut self, corners: &[[f64; 2]], colour: Rgb) {
         if let Some(marks) = &mut self.marks {
             let points: Vec<String> = corners.iter().map(|[x, y]| format!("{x:.2},{y:.2}")).collect();
             let _ = writeln!(marks, "<polygon points=\"{}\" fill=\"{}\"/>", points.join(" "), hex(colour));
@@ -169,7 +175,7 @@ impl Canvas {
     }
 
     /// Mixes a share of a colour into a pixel; places outside are ignored.
-    pub(super) fn blend(&mut self, x: i64, y: i64, colour: Rgb, share: f32) {
+    pub(in crate::io::picture) fn blend(&mut self, x: i64, y: i64, colour: Rgb, share: f32) {
         if (0..self.width as i64).contains(&x) && (0..self.height as i64).contains(&y) {
             let at = 3 * (y as usize * self.width + x as usize);
             for (pixel, value) in self.pixels[at..at + 3].iter_mut().zip(colour) {
@@ -180,7 +186,7 @@ impl Canvas {
     }
 
     /// The image as PNG.
-    pub(super) fn png(&self) -> std::io::Result<Vec<u8>> {
+    pub(in crate::io::picture) fn png(&self) -> std::io::Result<Vec<u8>> {
         let mut bytes = Vec::new();
         let mut encoder = png::Encoder::new(&mut bytes, self.width as u32, self.height as u32);
         encoder.set_color(png::ColorType::Rgb);
@@ -204,7 +210,7 @@ impl Canvas {
 
     /// Not collective. Writes the image under a temporary name first: as SVG if marks were collected, else as
     /// PNG.
-    pub(super) fn save(&self, path: &Path) -> Result<(), FileError> {
+    pub(in crate::io::picture) fn save(&self, path: &Path) -> Result<(), FileError> {
         // In memory first, as a buffered writer hides the error of its last piece.
         let bytes = if self.marks.is_some() { self.svg().map(String::into_bytes) } else { self.png() };
         let saved = bytes.and_then(|bytes| write_whole(path, &bytes));

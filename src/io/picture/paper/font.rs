@@ -8,17 +8,17 @@ static FONT: LazyLock<Option<FontRef<'static>>> =
     LazyLock::new(|| FontRef::try_from_slice(include_bytes!("fonts/DejaVuSans.ttf")).ok());
 
 /// Height of capital letters, pixels.
-pub(super) fn cap_height(size: f64) -> i64 {
+pub(in crate::io::picture) fn cap_height(size: f64) -> i64 {
     (7.0 * size).round() as i64
 }
 
 /// Size of the font, pixels: capitals of DejaVu Sans are 0.729 em high.
-pub(super) fn em(size: f64) -> f32 {
+pub(in crate::io::picture) fn em(size: f64) -> f32 {
     cap_height(size) as f32 / 0.729
 }
 
 /// The beginning of a text that is not wider than `width` pixels, and whether that is all of it.
-pub(super) fn fitting(size: f64, text: &str, width: i64) -> (&str, bool) {
+pub(in crate::io::picture) fn fitting(size: f64, text: &str, width: i64) -> (&str, bool) {
     let (mut pen, mut end) = (Pen::new(size), 0);
     for (at, character) in text.char_indices() {
         pen.add(character);
@@ -67,7 +67,7 @@ impl Pen {
 /// Calls `each` with column, row and coverage (0 to 1) of the pixels of a text whose first letter begins at
 /// column 0 and whose capital letters have their tops at row 0. Characters that the font does not have are
 /// boxes. Returns the width, pixels.
-pub(super) fn draw(size: f64, text: &str, mut each: impl FnMut(i64, i64, f32)) -> i64 {
+pub(in crate::io::picture) fn draw(size: f64, text: &str, mut each: impl FnMut(i64, i64, f32)) -> i64 {
     let mut pen = Pen::new(size);
     for character in text.chars() {
         let (Some((start, id)), Some(font)) = (pen.add(character), pen.font) else { continue };

@@ -1,21 +1,21 @@
 //! Title and caption above a picture.
 
-use super::canvas::Canvas;
-use super::colour::Paper;
+use crate::io::picture::paper::canvas::Canvas;
+use crate::io::picture::paper::colour::Paper;
 
 /// Most lines of each.
 const LINES: usize = 3;
 
 /// Title and caption in lines.
-pub(super) struct Heading {
+pub(in crate::io::picture) struct Heading {
     title: Vec<String>,
     caption: Vec<String>,
     /// Pixels that they need beside those of a line each.
-    pub(super) extra: i64,
+    pub(in crate::io::picture) extra: i64,
 }
 
 impl Heading {
-    pub(super) fn new(canvas: &Canvas, title: &str, caption: &str) -> Self {
+    pub(in crate::io::picture) fn new(canvas: &Canvas, title: &str, caption: &str) -> Self {
         let width = canvas.width as i64 - 2 * canvas.px(24.0);
         let (title, caption) =
             (canvas.lines(3.0, title, width, LINES), canvas.lines(2.0, caption, width, LINES));
@@ -24,7 +24,7 @@ impl Heading {
         Self { title, caption, extra }
     }
 
-    pub(super) fn write(&self, canvas: &mut Canvas, paper: &Paper) {
+    pub(in crate::io::picture) fn write(&self, canvas: &mut Canvas, paper: &Paper) {
         let (left, mut row) = (canvas.px(24.0), canvas.px(20.0));
         for line in &self.title {
             canvas.text(left, row, 3.0, line, paper.ink);

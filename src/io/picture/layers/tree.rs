@@ -1,18 +1,21 @@
 //! Leaves of the tree over a picture.
 use std::path::Path;
 
-use super::camera::{Bounds, Camera};
-use super::canvas::Canvas;
-use super::drawing::Drawing;
-use super::scene::Raster;
-use super::settings::Settings;
-use super::solids::Layer;
 use crate::io::frame::Leaves;
 use crate::io::hdf5_file::FileError;
+use crate::io::picture::camera::{Bounds, Camera};
+use crate::io::picture::drawing::Drawing;
+use crate::io::picture::layers::solids::Layer;
+use crate::io::picture::paper::canvas::Canvas;
+use crate::io::picture::scene::Raster;
+use crate::io::picture::settings::Settings;
 use crate::io::snapshot::Header;
 
 /// Lower corners and edges of the leaves that belong to an output, m.
-pub(super) fn leaves(from: &Path, header: &Header) -> Result<Vec<([f64; 3], f64)>, FileError> {
+pub(in crate::io::picture) fn leaves(
+    from: &Path,
+    header: &Header,
+) -> Result<Vec<([f64; 3], f64)>, FileError> {
     let Leaves { levels, coords } = Leaves::of_output(from)?;
     let low = |axis: usize| header.origin.get(axis).copied().unwrap_or(0.0);
     let leaf = |(level, coord): (u8, [u32; 3])| {
@@ -24,7 +27,7 @@ pub(super) fn leaves(from: &Path, header: &Header) -> Result<Vec<([f64; 3], f64)
 
 impl Drawing {
     /// Draws the edges of leaves: all in the plane; in space those that the clip or the floor cuts.
-    pub(super) fn tree(
+    pub(in crate::io::picture) fn tree(
         &self,
         canvas: &mut Canvas,
         camera: &Camera,

@@ -1,7 +1,7 @@
 //! Colours of values.
 
 /// Red, green, blue.
-pub(super) type Rgb = [u8; 3];
+pub(in crate::io::picture) type Rgb = [u8; 3];
 
 /// A colour map for amounts.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -68,7 +68,7 @@ impl Map {
     }
 
     /// Colour of a value between 0 and 1.
-    pub(super) fn colour(self, value: f64) -> Rgb {
+    pub(in crate::io::picture) fn colour(self, value: f64) -> Rgb {
         let steps = self.steps();
         let place = value.clamp(0.0, 1.0) * (steps.len() - 1) as f64;
         let low = (place as usize).min(steps.len() - 2);
@@ -89,7 +89,7 @@ const CLASSES: [Rgb; 8] = [
 ];
 
 /// Colour of a whole number.
-pub(super) fn class(number: usize) -> Rgb {
+pub(in crate::io::picture) fn class(number: usize) -> Rgb {
     CLASSES.get(number).copied().unwrap_or_else(|| further(number - CLASSES.len()))
 }
 
@@ -112,12 +112,12 @@ fn hsl(hue: f64, saturation: f64, lightness: f64) -> Rgb {
 }
 
 /// A colour made lighter or darker.
-pub(super) fn scaled(colour: Rgb, factor: f64) -> Rgb {
+pub(in crate::io::picture) fn scaled(colour: Rgb, factor: f64) -> Rgb {
     colour.map(|channel| (f64::from(channel) * factor).clamp(0.0, 255.0) as u8)
 }
 
 /// A share of the second colour in the first.
-pub(super) fn mixed(first: Rgb, second: Rgb, share: f64) -> Rgb {
+pub(in crate::io::picture) fn mixed(first: Rgb, second: Rgb, share: f64) -> Rgb {
     std::array::from_fn(|i| {
         let (a, b) = (f64::from(first[i]), f64::from(second[i]));
         (a + share * (b - a)).round() as u8
@@ -126,7 +126,7 @@ pub(super) fn mixed(first: Rgb, second: Rgb, share: f64) -> Rgb {
 
 /// Colours of all but the data.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Paper {
+pub(in crate::io::picture) struct Paper {
     pub paper: Rgb,
     pub ink: Rgb,
     pub floor: Rgb,
@@ -136,7 +136,7 @@ pub(super) struct Paper {
 }
 
 /// Of light and of dark pictures.
-pub(super) const LIGHT: Paper = Paper {
+pub(in crate::io::picture) const LIGHT: Paper = Paper {
     paper: [250, 250, 248],
     ink: [40, 40, 44],
     floor: [232, 232, 228],
@@ -144,7 +144,7 @@ pub(super) const LIGHT: Paper = Paper {
     solid: [186, 190, 198],
     tree: [110, 110, 116],
 };
-pub(super) const DARK: Paper = Paper {
+pub(in crate::io::picture) const DARK: Paper = Paper {
     paper: [20, 22, 26],
     ink: [228, 228, 226],
     floor: [38, 41, 47],

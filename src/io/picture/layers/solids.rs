@@ -1,8 +1,8 @@
 //! Colliders and terrain behind and before the particles.
 use rayon::prelude::*;
 
-use super::camera::{Bounds, Camera, unit};
 use crate::geometry::vector::{cross, dot};
+use crate::io::picture::camera::{Bounds, Camera, unit};
 use crate::io::revolve::Revolve;
 
 /// Signed distance of a place, m.
@@ -26,7 +26,7 @@ impl std::fmt::Debug for Solid {
 
 impl Solid {
     /// The part above a plane across an axis, with its mirror image.
-    pub(super) fn mirrored(self, axis: usize, plane: f64) -> Self {
+    pub(in crate::io::picture) fn mirrored(self, axis: usize, plane: f64) -> Self {
         let Self { distance: own, mut triangles, bounds: [mut low, mut high] } = self;
         let images: Vec<_> = triangles
             .iter()
@@ -51,7 +51,7 @@ impl Solid {
 
 impl Solid {
     /// The body of revolution of a section.
-    pub(super) fn revolved(self, revolve: Revolve) -> Self {
+    pub(in crate::io::picture) fn revolved(self, revolve: Revolve) -> Self {
         let Self { distance: own, bounds: [low, high], .. } = self;
         let reach = high[0];
         let distance =
@@ -62,7 +62,7 @@ impl Solid {
 }
 
 /// Depth and brightness of the solids by pixel.
-pub(super) struct Layer {
+pub(in crate::io::picture) struct Layer {
     /// Depth of the surface, m; minus infinity where there is none.
     pub depth: Vec<f64>,
     /// Its brightness.
@@ -74,7 +74,7 @@ const MOST_STEPS: usize = 200;
 
 impl Layer {
     /// The solids as far as they lie in `frame`.
-    pub(super) fn new(
+    pub(in crate::io::picture) fn new(
         solids: &[Solid],
         camera: &Camera,
         frame: &Bounds,

@@ -1,6 +1,6 @@
 //! Widths of particles in pictures: those of their boxes in the solver.
-use super::source::{numbers, points};
 use crate::io::hdf5_file::{FileError, Reader};
+use crate::io::picture::source::{numbers, points};
 use crate::io::snapshot::Header;
 use crate::io::snapshot::intact::checked::Checked;
 use crate::kernel::domain::stretches_of_one;
@@ -62,7 +62,12 @@ impl Boxes {
     }
 
     /// Half widths of a particle of a run, m.
-    pub(super) fn of_chunk<const D: usize>(&self, chunk: &Chunk<D>, p: usize, root_edge: f64) -> [f64; 3] {
+    pub(in crate::io::picture) fn of_chunk<const D: usize>(
+        &self,
+        chunk: &Chunk<D>,
+        p: usize,
+        root_edge: f64,
+    ) -> [f64; 3] {
         let particle = Particle {
             half: self.coordinates.half_width(chunk.column(Layout::<D>::HALF)[p], chunk.position(p)[0]),
             elastic: symmetric(chunk, Layout::<D>::LEFT_CAUCHY_GREEN, p),
@@ -73,7 +78,11 @@ impl Boxes {
     }
 
     /// Half widths of all particles of a file, m; of one without restart state `None`.
-    pub(super) fn of_file(&self, file: &Reader, header: &Header) -> Result<Option<Vec<[f64; 3]>>, FileError> {
+    pub(in crate::io::picture) fn of_file(
+        &self,
+        file: &Reader,
+        header: &Header,
+    ) -> Result<Option<Vec<[f64; 3]>>, FileError> {
         let set = |name: &str| format!("state/particles/{name}");
         let needed = ["half_width", "left_cauchy_green", "history", "tag"].map(set);
         if !needed.iter().all(|name| file.exists(name)) {

@@ -1,11 +1,11 @@
 //! The vectors that a picture shows.
-use super::source::derived::{Source, magnitude};
 use crate::io::hdf5_file::{FileError, Reader};
+use crate::io::picture::source::derived::{Source, magnitude};
 use crate::io::snapshot::Header;
 
 /// The vectors that a picture shows.
 #[derive(Debug, Default)]
-pub(super) struct Vectors {
+pub(in crate::io::picture) struct Vectors {
     /// Name of the quantity, and its unit.
     pub name: String,
     pub unit: String,
@@ -15,7 +15,11 @@ pub(super) struct Vectors {
 
 impl Vectors {
     /// The vectors of this name, if one is given, of all particles of a file.
-    pub(super) fn read(file: &Reader, header: &Header, name: Option<&str>) -> Result<Self, FileError> {
+    pub(in crate::io::picture) fn read(
+        file: &Reader,
+        header: &Header,
+        name: Option<&str>,
+    ) -> Result<Self, FileError> {
         let Some(name) = name else { return Ok(Self::default()) };
         let source = Source::new(file, header);
         if !["x", "y"].iter().all(|axis| source.offers(&format!("{name}_{axis}"))) {
@@ -41,7 +45,7 @@ impl Vectors {
     }
 
     /// Length of the longest one.
-    pub(super) fn longest(&self) -> f64 {
+    pub(in crate::io::picture) fn longest(&self) -> f64 {
         self.each
             .iter()
             .map(|vector| magnitude(vector))
