@@ -2,29 +2,38 @@
 //!
 //! All positions are relative to the lower corner of the domain; only output adds
 //! [`Problem::origin`]. All quantities are in SI units.
+//!
+//! | module | |
+//! |---|---|
+//! | `body` | bodies, their materials and their stress at the start |
+//! | `stage` | stages, and when something acts |
+//! | `output` | time steps, output, checkpoints, reports |
 use crate::adaptivity::{Adaptivity, least_level};
 use crate::boundary::BodyContacts;
 use crate::boundary::Collider;
 use crate::boundary::absorbing::AbsorbingFaces;
 pub use crate::boundary::{Contact, Leaving as LeavingPolicy};
-use crate::geometry::{Aabb, Sampling, Shape};
+use crate::geometry::{Aabb, Shape};
 pub use crate::io::snapshot::PointField as Field;
 use crate::job::parse::error::Position;
 pub use crate::kernel::{BoxPolicy, Coordinates, Transfer};
 use crate::load::{Gravity, Load, Seepage, Water};
-use crate::material::Consolidation;
-use crate::material::parameters::Parameters;
-use crate::material::undrained::{self, Undrained};
-use crate::material::{Failed, Material, Viscosity};
-use crate::particle::followed::Followed;
-use crate::particle::given::Given;
+use crate::material::Viscosity;
 use crate::probe::{Flux, Line, Map, Probe, Track};
-use crate::quantity::{Quantity, in_job};
-use crate::solver::{Equilibrium, QuasiStatic, Ties};
+use crate::quantity::in_job;
+use crate::solver::{QuasiStatic, Ties};
 use crate::source::Source;
 use partition::{Brick, Octant};
 use std::path::PathBuf;
-use std::sync::{Arc, OnceLock};
+use std::sync::OnceLock;
+
+mod body;
+mod output;
+mod stage;
+
+pub use body::{Body, InitialStress, MaterialSetup, StressKind};
+pub use output::{CheckpointSetup, CollapseLaw, OutputSetup, ReportSetup, TimeSetup};
+pub use stage::{FactorSearch, InStages, Stage};
 
 /// Cells along the edge of a leaf.
 pub const CELLS_PER_LEAF: u32 = 4;
@@ -327,272 +336,4 @@ pub struct Region<const D: usize> {
     pub shape: Shape<D>,
     /// Level that leaves have there at least.
     pub level: u8,
-}
-
-/// A material of the job.
-#[derive(Clone, Debug, PartialEq)]
-pub struct MaterialSetup {
-    /// Name.
-    pub name: String,
-    /// Density of the undeformed material, kg/m³.
-    pub density: f64,
-    /// Density of the undeformed material with full pores, kg/m³.
-    pub saturated_density: f64,
-    /// Constitutive model.
-    pub model: Parameters,
-    /// Water that cannot leave its pores.
-    pub undrained: Option<Undrained>,
-    /// Fate of its particles when they fail.
-    pub failed: Failed,
-}
-
-impl MaterialSetup {
-    /// The material as the solver calls it.
-    pub fn build(&self) -> Box<dyn Material> {
-        undrained::build(&self.model, self.undrained.as_ref(), self.density)
-    }
-
-    /// Whether it is a gas, or becomes one.
-    pub fn is_gas(&self) -> bool {
-        matches!(self.model, Parameters::Gas(_) | Parameters::Explosive(_))
-    }
-}
-
-/// A body of particles.
-#[derive(Clone, Debug)]
-pub struct Body<const D: usize> {
-    /// Name.
-    pub name: String,
-    /// Region that it fills.
-    pub shape: Shape<D>,
-    /// Place of the shape in the files of the job, for messages.
-    pub place: Position,
-    /// Index into [`Problem::materials`].
-    pub material: usize,
-    /// Velocity without that of rotation, m/s; it may depend on the place.
-    pub velocity: [Quantity; D],
-    /// Angular velocity about the body's centre, rad/s; only the third component in plane strain.
-    pub angular_velocity: [f64; 3],
-    /// The point that the angular velocity turns about: the centre of the bounding box, m.
-    pub centre: [f64; D],
-    /// The stage at whose start it comes; 0: it is there from the start.
-    pub stage: usize,
-    /// Particles per cell along each axis; not necessarily a whole number.
-    pub particles_per_cell: f64,
-    /// Arrangement of its particles about the points of the lattice.
-    pub sampling: Sampling<D>,
-    /// Stress at the start, if there is any.
-    pub stress: Option<InitialStress>,
-    /// Its particles, where the job gives them one by one; the shape then is a box about them.
-    pub given: Option<Arc<Given<D>>>,
-    /// Number of the source that feeds it, if one does: then no particle of it is there from the start.
-    pub fed: Option<usize>,
-}
-
-/// A stage of the run: its changes at the start, and its end.
-#[derive(Clone, Debug)]
-pub struct Stage<const D: usize> {
-    /// Name; empty in a job without stages.
-    pub name: String,
-    /// Longest duration, s; infinite where only the end of the run or equilibrium ends it.
-    pub duration: f64,
-    /// Equilibrium to which kinetic damping leads, and at which the stage ends.
-    pub equilibrium: Option<Equilibrium>,
-    /// Bodies that are removed.
-    pub removed: Vec<usize>,
-    /// Bodies with their new materials.
-    pub materials: Vec<(usize, usize)>,
-    /// New gravity, its time counted from the start of the stage.
-    pub gravity: Option<Gravity<D>>,
-    /// New conditions on faces.
-    pub faces: [[Option<Contact>; 2]; D],
-    /// Material beyond the new faces that absorb waves.
-    pub absorbing: AbsorbingFaces<D>,
-    /// New treatment of particles that leave the domain.
-    pub leaving: Option<LeavingPolicy>,
-    /// Whether all material is at rest at the start.
-    pub at_rest: bool,
-    /// Whether displacements are counted from its start.
-    pub reset_displacement: bool,
-    /// Search for the factor of safety, with which the run ends.
-    pub reduction: Option<FactorSearch>,
-}
-
-/// Search for the greatest factor with whose strength over it there is equilibrium.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct FactorSearch {
-    /// First factor.
-    pub from: f64,
-    /// Last factor.
-    pub to: f64,
-    /// Growth of the factor in a load step.
-    pub step: f64,
-    /// Greatest difference between the last factor with equilibrium and the first without.
-    pub tolerance: f64,
-    /// Whether flow becomes associated (Davis 1968).
-    pub davis: bool,
-}
-
-impl<const D: usize> Stage<D> {
-    /// A stage that changes nothing and lasts to the end of the run.
-    pub fn whole_run(equilibrium: Option<Equilibrium>) -> Self {
-        Self {
-            name: String::new(),
-            duration: f64::INFINITY,
-            equilibrium,
-            removed: Vec::new(),
-            materials: Vec::new(),
-            gravity: None,
-            faces: [[None; 2]; D],
-            absorbing: std::array::from_fn(|_| [None, None]),
-            leaving: None,
-            at_rest: false,
-            reset_displacement: false,
-            reduction: None,
-        }
-    }
-}
-
-/// The stages in which a load or a collider acts; all of them: `None`.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct InStages(pub Option<Vec<usize>>);
-
-impl InStages {
-    /// Whether it acts in a stage.
-    pub fn has(&self, stage: usize) -> bool {
-        self.0.as_ref().is_none_or(|stages| stages.contains(&stage))
-    }
-
-    /// Time from which its own time is counted, s, with the times at which stages began. Infinite until it
-    /// acts for the first time.
-    pub fn clock(&self, starts: &[f64]) -> f64 {
-        let first = self.0.as_ref().map_or(0, |stages| stages.iter().copied().min().unwrap_or(0));
-        starts.get(first).copied().unwrap_or(f64::INFINITY)
-    }
-}
-
-/// Stress of a body at the start.
-#[derive(Clone, Debug)]
-pub struct InitialStress {
-    /// Place of its table in the files of the job, for messages.
-    pub place: Position,
-    /// The stress itself.
-    pub kind: StressKind,
-    /// Whether a stress outside the yield surface returns to it; else it is an error.
-    pub relax: bool,
-    /// Consolidation, in place of that of the material.
-    pub consolidation: Option<Consolidation>,
-}
-
-/// Stress of a body at the start. Levels are in the coordinates of the job, along the axis of gravity.
-#[derive(Clone, Debug)]
-pub enum StressKind {
-    /// The weight above, Pa, with this ratio of horizontal to vertical stress, under a surface (found:
-    /// `None`) with a pressure on it.
-    Weight {
-        /// Horizontal over vertical stress.
-        ratio: Quantity,
-        /// Level of the surface, m.
-        surface: Option<Quantity>,
-        /// Pressure on the surface, Pa.
-        surcharge: Quantity,
-    },
-    /// Vertical and horizontal pressures, Pa, over the depth under a surface, m.
-    Depth {
-        /// Rows of depth and pressures, depths increasing.
-        rows: Vec<[f64; 3]>,
-        /// Level of depth 0, m.
-        surface: Option<Quantity>,
-    },
-    /// Components `xx, yy, zz, xy, xz, yz`, Pa, tension positive.
-    Components(Box<[Quantity; 6]>),
-}
-
-impl StressKind {
-    /// All quantities that it has.
-    pub fn quantities(&self) -> Vec<&Quantity> {
-        match self {
-            Self::Weight { ratio, surface, surcharge } => {
-                [ratio, surcharge].into_iter().chain(surface).collect()
-            }
-            Self::Depth { surface, .. } => surface.iter().collect(),
-            Self::Components(components) => components.iter().collect(),
-        }
-    }
-}
-
-/// End and time step.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct TimeSetup {
-    /// End of the run, s; it ends with the first step that reaches this time.
-    pub end: f64,
-    /// Courant number.
-    pub cfl: f64,
-    /// Longest time step, s.
-    pub dt_max: Option<f64>,
-    /// Most that a step may exceed the one before it, as a factor.
-    pub growth: f64,
-}
-
-/// Output files.
-#[derive(Clone, Debug, PartialEq)]
-pub struct OutputSetup {
-    /// Directory for all files of the run; made if missing.
-    pub directory: PathBuf,
-    /// Simulated time between output files, s; `None`: at the start and the end only.
-    pub every: Option<f64>,
-    /// Particle fields beside the position.
-    pub fields: Vec<Field>,
-    /// Quantities that particles carry for the fields.
-    pub followed: Followed,
-    /// Whether each output file carries the complete state, so that a run can restart from it.
-    pub restart: bool,
-    /// Whether a picture of the last state is drawn.
-    pub picture: bool,
-    /// Field that colours it; `None`: by the materials.
-    pub picture_field: Option<Field>,
-    /// Whether the run ends with a page for a browser.
-    pub report: bool,
-}
-
-/// When checkpoints are written, beside the end of the run.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct CheckpointSetup {
-    /// Steps between checkpoints.
-    pub every_steps: Option<u64>,
-    /// Simulated time between checkpoints, s.
-    pub every_time: Option<f64>,
-    /// Minutes of wall time between checkpoints.
-    pub every_wall_minutes: Option<f64>,
-    /// Checkpoints kept; older ones are deleted once a newer one is complete.
-    pub keep: usize,
-}
-
-/// Evaluation at the end of a run.
-#[derive(Clone, Debug, PartialEq)]
-pub enum ReportSetup<const D: usize> {
-    /// Run-out and height of a collapsed granular column beside published laws.
-    ColumnCollapse {
-        /// Centre of the column's foot, m.
-        base: [f64; D],
-        /// The axis that points up.
-        up: usize,
-        /// Initial radius (axisymmetric) or half width (planar), m.
-        radius: f64,
-        /// Initial height, m.
-        height: f64,
-        /// Which laws to compare with.
-        law: CollapseLaw,
-    },
-}
-
-/// Published laws of granular column collapse.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize, schemars::JsonSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum CollapseLaw {
-    /// Cylinders: Lube, Huppert, Sparks, Hallworth, J. Fluid Mech. 508 (2004).
-    #[schemars(extend("x-dimension" = 3))]
-    Axisymmetric,
-    /// Columns between walls: Lube, Huppert, Sparks, Freundt, Phys. Rev. E 72 (2005).
-    Planar,
 }
