@@ -122,11 +122,13 @@ impl<const D: usize> Unknowns<D> {
         &self.ties
     }
 
-    /// The node itself, or the corners that it follows, with shares that bound a stiffness at it.
-    pub(super) fn leaders(&self, node: usize) -> Vec<(usize, f64)> {
-        match self.ties.iter().find(|(tied, _)| *tied == node) {
+    /// Of a node itself, or the corners that it follows, with shares that bound a stiffness at it.
+    pub(super) fn leaders(&self) -> impl Fn(usize) -> Vec<(usize, f64)> {
+        let ties: FxHashMap<usize, &[(usize, f64)]> =
+            self.ties.iter().map(|(node, corners)| (*node, corners.as_slice())).collect();
+        move |node| match ties.get(&node) {
             None => vec![(node, 1.0)],
-            Some((_, corners)) => {
+            Some(corners) => {
                 let all: f64 = corners.iter().map(|(_, weight)| weight.abs()).sum();
                 corners.iter().map(|&(corner, weight)| (corner, all * weight.abs())).collect()
             }

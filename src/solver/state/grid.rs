@@ -54,7 +54,7 @@ pub struct Grid<const D: usize> {
     pub(in crate::solver) inside_still: InsideStill<D>,
     /// Nodes inside colliders that move, in this step, by block and collider; empty without such colliders.
     pub(in crate::solver) inside_moving: InsideStill<D>,
-    /// Bytes of the last exchange of sums.
+    /// Bytes that this rank sent of the last sums of masses and momenta.
     pub(in crate::solver) sum_bytes: u64,
 }
 
@@ -218,11 +218,8 @@ impl<const D: usize> Grid<D> {
     /// Collective over neighbours. Starts sending the sums that neighbours need.
     fn send_sums(&mut self, phases: &mut Phases) -> Pending {
         let Self { plan, arenas, fields, exchange, .. } = self;
-        let before = exchange.traffic().bytes;
         let messages = phases.time(Phase::Sum, || exchange.pack(plan, arenas, fields));
-        let pending = phases.time(Phase::Exchange, || exchange.begin(messages));
-        self.sum_bytes = exchange.traffic().bytes - before;
-        pending
+        phases.time(Phase::Exchange, || exchange.begin(messages))
     }
 
     /// Heap bytes held.

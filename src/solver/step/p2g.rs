@@ -57,7 +57,9 @@ impl<const D: usize> Solver<D> {
     /// Collective over neighbours. Momentum with the impulse of stress over `dt`, and mass, on real nodes, in
     /// each velocity field.
     pub(in crate::solver) fn nodes_from_particles(&mut self, dt: f64) {
+        let before = self.grid.exchange.traffic().bytes;
         self.for_each_field(|solver, _| solver.field_from_particles(dt));
+        self.grid.sum_bytes = self.grid.exchange.traffic().bytes - before;
     }
 
     /// As [`Solver::nodes_from_particles`] in the first field.

@@ -144,8 +144,9 @@ impl<const D: usize> Multigrid<D> {
                 sums[words * number as usize] += (stiffness[node] * unit) as i64;
             }
         }
+        let leaders = springs.is_some().then(|| unknowns.leaders());
         for (node, spring) in springs.into_iter().flatten().filter(|(node, _)| unknowns.owned[*node]) {
-            for (leader, share) in unknowns.leaders(*node) {
+            for (leader, share) in leaders.iter().flat_map(|leaders| leaders(*node)) {
                 let Some(number) = self.numbers.get(leader).filter(|number| **number != NONE) else {
                     continue;
                 };
