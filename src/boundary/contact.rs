@@ -95,9 +95,10 @@ impl Contact {
         matches!(self, Self::Sticky | Self::Slip | Self::Separating { .. })
     }
 
-    /// Whether it holds what moves away as well.
-    pub const fn holds_both_ways(self) -> bool {
-        matches!(self, Self::Sticky | Self::Slip)
+    /// What it asks across a gap (m) of material between nodes with cells of this edge (m), in a step of length
+    /// `dt`, s.
+    pub fn across(self, gap: f64, cell: f64, dt: f64) -> Bounds {
+        Bounds::across(gap, cell, dt, matches!(self, Self::Sticky | Self::Slip))
     }
 
     /// Shear stress that holds without pressure, Pa.
@@ -137,12 +138,6 @@ impl Contact {
             Self::Absorbing => "absorbing",
         }
     }
-}
-
-/// Whether the sums at the nodes of so many velocity fields can tell what has yielded, with these laws at
-/// surfaces: then they say neither the area of the material nor where bodies meet.
-pub fn can_tell_yield(fields: usize, mut laws: impl Iterator<Item = Contact>) -> bool {
-    fields == 1 && !laws.any(Contact::acts_by_area)
 }
 
 impl fmt::Display for Contact {
@@ -202,11 +197,7 @@ mod tests {
     #[test]
     fn across_a_gap_material_moves_freely_up_to_the_surface() {
         let after = |contact: Contact, gap: f64, mut v: [f64; 2]| {
-            contact.apply_within(
-                Bounds::across(gap, 1.0, 0.1, contact.holds_both_ways()),
-                &mut v,
-                &[0.0, 1.0],
-            );
+            contact.apply_within(contact.across(gap, 1.0, 0.1), &mut v, &[0.0, 1.0]);
             v
         };
         let friction = Contact::Separating { friction: 0.5, cohesion: 0.0, drag: 0.0 };

@@ -36,9 +36,14 @@ pub fn height(volume: f64, slope: f64, cell: f64, bend: f64) -> f64 {
     if q <= 0.5 { 1.0 - 2.0 * q } else { q.mul_add(q, 2.0).sqrt() - q - 1.0 }
 }
 
-/// Plastic strain from which on material counts as yielded: its boxes no longer tile, and the height that it
-/// has over nodes has errors of a tenth of a cell and more. Over such gaps the foot of a plastic rod that
-/// strikes a face would spread too little.
+/// `-Σ V ∂w/∂n` along a normal, from the sum of gradients `Σ V ∇w`.
+pub fn slope<const D: usize>(gradient: &[f64; 4], normal: &[f64; D]) -> f64 {
+    -(0..D).fold(0.0, |sum, a| gradient[a].mul_add(normal[a], sum))
+}
+
+/// Plastic strain, or damage, from which on material counts as yielded: its boxes no longer tile, and the height
+/// that it has over nodes has errors of a tenth of a cell and more. Over such gaps the foot of a plastic rod
+/// that strikes a face would spread too little.
 const YIELDED: f64 = 0.02;
 
 /// Volume over slope and cell from which on material that has yielded is all there is.
@@ -65,10 +70,13 @@ pub enum Meets {
     /// At its surface as long as it is elastic, wherever it is at the nodes once it has yielded: metals and
     /// clay.
     Firm,
+    /// The same, without ties of surface nodes: material whose strength comes from pressure or is lost in
+    /// cracks, as sand, rock and snow.
+    Frictional,
     /// Wherever it is, at the feet of the nodes inside colliders: fluids. Over gaps water would gather at
     /// walls.
     Feet,
-    /// Wherever it is, at the nodes: material whose strength comes from pressure or is lost in cracks.
+    /// Wherever it is, at the nodes: fluids that move with what yields.
     Nodes,
 }
 
@@ -76,7 +84,7 @@ impl Meets {
     /// Of two materials that move together: later ones go before earlier ones, but for fluids with what yields.
     pub fn together(self, other: Self) -> Self {
         match [self.min(other), self.max(other)] {
-            [Self::Firm, Self::Feet] => Self::Nodes,
+            [Self::Firm | Self::Frictional, Self::Feet] => Self::Nodes,
             [_, later] => later,
         }
     }
@@ -131,6 +139,22 @@ mod tests {
             }
         }
         assert_eq!(height(1.0, 0.0, 1.0, 0.0), -1.0);
+    }
+
+    #[test]
+    fn what_moves_together_meets_surfaces_as_the_one_with_less_freedom() {
+        use Meets::{Feet, Firm, Frictional, Nodes, Surface};
+        let cases = [
+            (Surface, Firm, Firm),
+            (Surface, Feet, Feet),
+            (Firm, Frictional, Frictional),
+            (Firm, Feet, Nodes),
+            (Frictional, Feet, Nodes),
+            (Feet, Nodes, Nodes),
+        ];
+        for (one, other, both) in cases {
+            assert_eq!((one.together(other), other.together(one)), (both, both), "{one:?}, {other:?}");
+        }
     }
 
     #[test]

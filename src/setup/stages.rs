@@ -108,11 +108,11 @@ pub fn meets<const D: usize>(problem: &Problem<D>, field: u8, stage: usize) -> M
         let materials = (body.stage..=stage).map(|stage| {
             let setup = &problem.materials[material_of(problem, number, stage)];
             let material = setup.build();
-            match (material.is_fluid(), material.is_plastic()) {
-                (true, _) => Meets::Feet,
-                (false, true) if material.is_firm() => Meets::Firm,
-                (false, true) => Meets::Nodes,
-                (false, false) => Meets::Surface,
+            match (material.keeps_its_shape(), material.is_plastic()) {
+                (true, false) => Meets::Surface,
+                (true, true) => Meets::Firm,
+                (false, _) if material.is_fluid() => Meets::Feet,
+                (false, _) => Meets::Frictional,
             }
         });
         materials.reduce(Meets::together).unwrap_or_default()

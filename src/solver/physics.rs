@@ -3,7 +3,6 @@ use std::ops::Range;
 
 use crate::adaptivity::{Adaptivity, Cohesion};
 use crate::boundary::absorbing::AbsorbingFaces;
-use crate::boundary::contact::can_tell_yield;
 use crate::boundary::{BodyContacts, Collider, Contact, Leaving, Meets};
 use crate::kernel::{BoxPolicy, Coordinates, Scheme, Transfer};
 use crate::load::{self, Gravity, Load, Seepage, Water};
@@ -254,13 +253,13 @@ impl<const D: usize> Physics<D> {
 
     /// Whether the material of a velocity field moves freely over the gap between it and a surface.
     pub(in crate::solver) fn moves_over_gaps(&self, field: usize) -> bool {
-        self.meets(field) == Meets::Surface || self.is_firm(field)
+        self.meets(field) == Meets::Surface || self.moves_until_it_yields(field)
     }
 
-    /// Whether it does as long as it is elastic.
-    pub(in crate::solver) fn is_firm(&self, field: usize) -> bool {
-        self.meets(field) == Meets::Firm
-            && can_tell_yield(self.body_contacts.fields(), self.laws_at_surfaces())
+    /// Whether it does as long as it is elastic: where no law at surfaces asks for the area of what has yielded,
+    /// since the sums at nodes then leave out its slope.
+    pub(in crate::solver) fn moves_until_it_yields(&self, field: usize) -> bool {
+        matches!(self.meets(field), Meets::Firm | Meets::Frictional) && !self.has_walls_by_area()
     }
 
     /// Laws at faces and colliders.
@@ -283,7 +282,7 @@ impl<const D: usize> Physics<D> {
             (Meets::Feet, _) => true,
             (_, Contact::Sticky) => false,
             (Meets::Surface, _) => true,
-            (Meets::Firm, law) => self.is_firm(field) || law.acts_by_area(),
+            (Meets::Firm | Meets::Frictional, law) => self.moves_until_it_yields(field) || law.acts_by_area(),
             (Meets::Nodes, law) => law.acts_by_area(),
         };
         collider.acts_on_nodes() && has_feet

@@ -300,7 +300,7 @@ fn rest_on(law: &str, young: f64, surface: f64, collider: &str) -> [f64; 2] {
 }
 
 /// On faces and colliders of each kind, at any height between rows of nodes, with soft and stiff material, and
-/// metal and clay that have not yielded: the block lies on the surface, and its lowest rows carry its weight.
+/// metal, clay, rock and what cracks, as long as none has yielded, also beside a body in contact: the block lies on the surface, and its lowest rows carry its weight.
 /// Without the gap it hovers up to a cell above, and the lowest row has 6 to 23 times the stress. On `slip`
 /// colliders between rows the stress is within 6 %; nodes behind a `sticky` one hold, so that there its lowest
 /// row is right on rows alone.
@@ -322,8 +322,25 @@ fn blocks_come_to_rest_on_the_surface_with_their_weight() {
         let between = [0.265625, 0.28125, 0.31].into_iter().filter(|_| kind == "slip");
         cases.extend(between.map(|height| (elastic, 1e6, height, format!("{}\n{law}", floor(height)))));
     }
-    for law in ["model = 'von_mises'\nyield_stress = 1e5", "model = 'tresca'\nyield_stress = 1e5"] {
+    let rock = "model = 'drucker_prager'\nfriction_angle = 30\ncohesion = 1e5";
+    let metal = "model = 'von_mises'\nyield_stress = 1e5";
+    let cracks = "model = 'hencky'\ndamage = { kind = 'rankine', strength = 1e5, fracture_energy = 1e3 }";
+    let laws = [
+        metal,
+        "model = 'tresca'\nyield_stress = 1e5",
+        rock,
+        "model = 'mohr_coulomb'\nfriction_angle = 30\ncohesion = 1e5",
+        cracks,
+    ];
+    for law in laws {
         cases.extend([(law, 1e6, 0.0, String::new()), (law, 1e6, 0.28125, floor(0.28125))]);
+    }
+    // Sums at walls are apart from those between bodies.
+    for law in [metal, rock] {
+        let beside = "[[bodies]]\nname = 'beside'\nmaterial = 'm'\n\
+                      shape = { kind = 'box', min = [1, 0.34375], max = [1.25, 0.84375] }\n\
+                      [[contact]]\nname = 'side'\nbetween = ['block', 'beside']\nfriction = 0.2\n";
+        cases.push((law, 1e6, 0.28125, format!("{beside}{}", floor(0.28125))));
     }
     for (law, young, surface, collider) in cases {
         let [gap, stress] = rest_on(law, young, surface, &collider);

@@ -2,7 +2,6 @@
 use std::io::Write;
 
 use crate::adaptivity::Adaptivity;
-use crate::boundary::contact::can_tell_yield;
 use crate::boundary::{ActsOn, Contact, Meets};
 use crate::job::Problem;
 use crate::job::problem::{Coordinates, InStages};
@@ -225,9 +224,13 @@ fn held_at_nodes<const D: usize>(problem: &Problem<D>) -> Option<String> {
     let field_of_body = &problem.body_contacts.field_of_body;
     let field = |body: usize| field_of_body.get(body).map_or(0, |&field| usize::from(field));
     let bodies = problem.bodies.iter().enumerate();
-    let laws = problem.colliders.iter().map(|collider| collider.contact).chain(of_each_face.copied());
-    let is_alone = can_tell_yield(problem.body_contacts.fields(), laws);
-    let at_nodes = |meets: Meets| meets == Meets::Nodes || (meets == Meets::Firm && !is_alone);
+    let mut laws = problem.colliders.iter().map(|collider| collider.contact).chain(of_each_face.copied());
+    let by_area = laws.any(Contact::acts_by_area);
+    let at_nodes = |meets: Meets| match meets {
+        Meets::Nodes => true,
+        Meets::Firm | Meets::Frictional => by_area,
+        Meets::Surface | Meets::Feet => false,
+    };
     let bodies = bodies.filter(|(number, _)| at_nodes(meets[field(*number)]));
     let names: Vec<String> = bodies.map(|(_, body)| excerpt(&body.name, NAME).into()).collect();
     match names.len() {

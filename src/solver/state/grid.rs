@@ -279,6 +279,8 @@ pub(in crate::solver) struct Solids<const D: usize> {
     pub(in crate::solver) members: Vec<Vec<u32>>,
     /// Sums that the copies scatter: volumes and their gradients.
     pub(in crate::solver) field: VelocityField<D>,
+    /// The same without the gradients of what has yielded, where walls and other bodies both ask.
+    pub(in crate::solver) elastic: Option<VelocityField<D>>,
 }
 
 impl<const D: usize> Solids<D> {
@@ -288,11 +290,19 @@ impl<const D: usize> Solids<D> {
             copies: vec![Chunk::new(); leaves],
             members: vec![Vec::new(); leaves],
             field: VelocityField::new(plan),
+            elastic: None,
         }
     }
 
+    /// The sums by node as walls ask for them.
+    pub(in crate::solver) fn at_walls(&self) -> &[Row] {
+        &self.elastic.as_ref().unwrap_or(&self.field).fields.rows
+    }
+
     fn heap_bytes(&self) -> usize {
-        self.field.heap_bytes() + self.copies.iter().map(Chunk::heap_bytes).sum::<usize>()
+        let sums = std::iter::once(&self.field).chain(&self.elastic);
+        sums.map(VelocityField::heap_bytes).sum::<usize>()
+            + self.copies.iter().map(Chunk::heap_bytes).sum::<usize>()
     }
 }
 

@@ -179,7 +179,7 @@ impl<const D: usize> Physics<D> {
         let touches = !self.moves_over_gaps(field);
         let over =
             walls.known_over.map(|lengths| lengths.drift).filter(|_| !touches || self.has_walls_by_area())?;
-        Some(Gaps { sums: &solids[field].field.fields.rows, over, touches, coordinates: self.coordinates })
+        Some(Gaps { sums: solids[field].at_walls(), over, touches, coordinates: self.coordinates })
     }
 }
 
@@ -195,17 +195,16 @@ impl Gaps<'_> {
         normal: &[f64; D],
         cell: f64,
         [cohesion, drag]: [f64; 2],
-        both_ways: bool,
+        law: Contact,
     ) -> Bounds {
         let row = self.sums[node].0;
-        let slope = -(0..D).fold(0.0, |sum, a| row[a].mul_add(normal[a], sum));
+        let slope = gap::slope(&row, normal);
         let bend = self.coordinates.bend(normal[0], cell, x[0]);
         let gap = cell * gap::height(row[3], slope, cell, bend);
         // At a face the slope is the area that the material has of it.
         let area = if self.touches || gap <= gap::STICKS * cell { slope.max(0.0) } else { 0.0 };
         let (sticking, drag) = (cohesion * area, if row[3] > 0.0 { drag * area / row[3] } else { 0.0 });
-        let bounds =
-            if self.touches { Bounds::TOUCHING } else { Bounds::across(gap, cell, self.over, both_ways) };
+        let bounds = if self.touches { Bounds::TOUCHING } else { law.across(gap, cell, self.over) };
         Bounds { sticking, drag, ..bounds }
     }
 }
@@ -257,9 +256,8 @@ pub fn apply_faces<const D: usize>(
                                 if row[3] > 0.0 { law.cohesion() * faces.kick / row[3] } else { 0.0 };
                             let gaps = faces.gaps.filter(|_| law.has_gap());
                             let by_area = [cohesion, law.drag() * faces.kick];
-                            let both_ways = law.holds_both_ways();
                             let at = (node as usize, &x);
-                            let bounds = gaps.map(|gaps| gaps.bounds(at, &normal, cell, by_area, both_ways));
+                            let bounds = gaps.map(|gaps| gaps.bounds(at, &normal, cell, by_area, law));
                             law.apply_within(bounds.unwrap_or(Bounds::TOUCHING), &mut velocity, &normal);
                         }
                     }

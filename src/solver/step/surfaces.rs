@@ -15,7 +15,7 @@ use crate::particle::group::Group;
 use crate::particle::volume::{box_volume, volume_ratios};
 use crate::solver::sorting::box_widths::BinMissing;
 use crate::solver::state::Solver;
-use crate::solver::state::grid::Solids;
+use crate::solver::state::grid::{Solids, VelocityField};
 use crate::solver::step::p2g::scatter;
 
 /// Share of a length by which boxes that must hold something are larger.
@@ -29,14 +29,13 @@ fn box_of_nodes<const D: usize>(plan: &GridPlan<D>, block: usize, nodes: u64) ->
 
 /// Makes `copy` the particles of a group in a box, which scatter volumes in place of masses, and gradients of
 /// volumes in place of the impulse of stress over 1 s. Velocities and affine states of a copy are zero.
-/// What has yielded has no gradient where material `is_firm`. Returns of which particles these are copies.
+/// Returns of which particles these are copies.
 fn copy_solids<const D: usize>(
     copy: &mut Chunk<D>,
     chunk: &Chunk<D>,
     group: Option<&Group<'_>>,
     aabb: &Aabb<D>,
     columns: &[usize],
-    is_firm: bool,
 ) -> Vec<u32> {
     let members = members_in(chunk, group, aabb);
     copy.gather_columns(chunk, &members, columns);
@@ -45,11 +44,21 @@ fn copy_solids<const D: usize>(
         let ratios = volume_ratios::<D>(tile);
         for (lane, ratio) in ratios.into_iter().enumerate() {
             tile[Layout::<D>::MASS][lane] = box_volume::<D>(tile[Layout::<D>::HALF][lane]) * ratio;
-            let share = if is_firm { elastic_share(tile[Layout::<D>::PLASTIC_STRAIN][lane]) } else { 1.0 };
-            (0..3).for_each(|c| tile[Layout::<D>::STRESS + c][lane] = -ratio * share);
+            (0..3).for_each(|c| tile[Layout::<D>::STRESS + c][lane] = -ratio);
         }
     }
     members
+}
+
+/// Takes what has yielded out of the gradients of copies.
+fn keep_elastic<const D: usize>(copy: &mut Chunk<D>) {
+    let (tiles, _) = copy.tiles_mut_and_tags();
+    for tile in tiles.chunks_exact_mut(Layout::<D>::REALS) {
+        let share = tile[Layout::<D>::PLASTIC_STRAIN].map(elastic_share);
+        for c in 0..3 {
+            tile[Layout::<D>::STRESS + c].iter_mut().zip(share).for_each(|(stress, share)| *stress *= share);
+        }
+    }
 }
 
 /// Particles of a group in a box: first whole tiles, if at least half of one is in the box, then the others,
@@ -84,8 +93,14 @@ fn members_in<const D: usize>(chunk: &Chunk<D>, group: Option<&Group<'_>>, aabb:
 impl<const D: usize> Solver<D> {
     /// Collective over neighbours. Leaves `Σ V ∇w` and `Σ V w` of each velocity field at these nodes, given
     /// block by block, with the constrained ones that hand sums to real ones among them. Fields that are not
-    /// `is_asked` for are left out.
-    pub(super) fn find_volumes(&mut self, scattering: &[u64], is_asked: &[bool]) -> Result<(), BinMissing> {
+    /// `is_asked` for are left out. What has yielded gives walls no gradients where it moves over gaps until
+    /// then; `is_between` says that other bodies ask too, and for all gradients.
+    pub(super) fn find_volumes(
+        &mut self,
+        scattering: &[u64],
+        is_asked: &[bool],
+        is_between: bool,
+    ) -> Result<(), BinMissing> {
         if !is_asked.contains(&true) {
             return Ok(());
         }
@@ -103,10 +118,11 @@ impl<const D: usize> Solver<D> {
             let group = solver.physics.group(field);
             let (widths, scheme) = (solver.physics.widths(&solver.grid.plan), solver.physics.scheme());
             let plan = &solver.grid.plan;
-            let is_firm = solver.physics.is_firm(field);
-            let yielded = is_firm.then_some(Layout::<D>::PLASTIC_STRAIN);
+            let yields =
+                solver.grid.walls.known_over.is_some() && solver.physics.moves_until_it_yields(field);
+            let yielded = yields.then_some(Layout::<D>::PLASTIC_STRAIN);
             let columns: Vec<usize> = domain::columns::<D>().chain(yielded).collect();
-            let Solids { copies, members, field: geometry } = &mut solids[field];
+            let Solids { copies, members, field: all, elastic } = &mut solids[field];
             let leaves = copies.par_iter_mut().zip(members).zip(&solver.chunks).zip(near).enumerate();
             leaves.with_min_len(16).for_each(|(leaf, (((copy, members), chunk), near))| {
                 if near.is_empty() {
@@ -115,22 +131,29 @@ impl<const D: usize> Solver<D> {
                 }
                 let cell = plan.finest_cell(leaf);
                 let half = widths.greatest_of_wide(chunk, cell).max(0.5 * cell);
-                *members = copy_solids(
-                    copy,
-                    chunk,
-                    group.as_ref(),
-                    &near.grown(half * (1.0 + MARGIN)),
-                    &columns,
-                    is_firm,
-                );
+                *members =
+                    copy_solids(copy, chunk, group.as_ref(), &near.grown(half * (1.0 + MARGIN)), &columns);
+                if yields && !is_between {
+                    keep_elastic(copy);
+                }
             });
-            solver.grid.swap(geometry);
-            let of_field = solver.grid.sort(&mut solver.phases, copies, (&widths, scheme.coordinates), None);
-            solver.grid.scatter_and_sum(&mut solver.phases, copies, |scratch, bin, arena| {
-                scatter(scratch, bin, copies, &scheme, 1.0, arena);
-            });
-            solver.grid.swap(geometry);
-            sorted = sorted.and(of_field);
+            let Self { grid, phases, .. } = solver;
+            *elastic = (yields && is_between)
+                .then(|| elastic.take().unwrap_or_else(|| VelocityField::new(&grid.plan)));
+            let mut sum = |sums: &mut VelocityField<D>, copies: &[Chunk<D>]| {
+                grid.swap(sums);
+                let of_field = grid.sort(phases, copies, (&widths, scheme.coordinates), None);
+                grid.scatter_and_sum(phases, copies, |scratch, bin, arena| {
+                    scatter(scratch, bin, copies, &scheme, 1.0, arena);
+                });
+                grid.swap(sums);
+                of_field
+            };
+            sorted = sorted.and(sum(all, copies));
+            if let Some(elastic) = elastic {
+                copies.par_iter_mut().with_min_len(16).for_each(keep_elastic);
+                sorted = sorted.and(sum(elastic, copies));
+            }
         });
         self.grid.solids = solids;
         sorted

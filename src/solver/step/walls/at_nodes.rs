@@ -54,7 +54,7 @@ pub(super) fn has_yielded<const D: usize>(sums: &[Row], row: usize, plane: &Plan
 /// `Σ V w` and `-Σ V ∂w/∂n` of a row along the normal of a surface.
 fn along<const D: usize>(sums: &[Row], row: usize, plane: &Plane<D>) -> [f64; 2] {
     let of_node = sums[row].0;
-    [of_node[3], -(0..D).fold(0.0, |sum, a| of_node[a].mul_add(plane.normal[a], sum))]
+    [of_node[3], gap::slope(&of_node, &plane.normal)]
 }
 
 /// Demands of the surfaces of a `sticky` collider that the node of this bit at `x` (m), with cells of this
@@ -75,7 +75,7 @@ fn open<const D: usize>(
             let above = (0..D).fold(0.0, |sum, a| (x[a] - plane.foot[a]).mul_add(plane.normal[a], sum));
             let bend = of.coordinates.bend(plane.normal[0], cell, x[0]);
             let gap = gap::height(volume, slope, cell, bend).mul_add(cell, above);
-            (Bounds::across(gap, cell, of.over, true), plane.normal)
+            (Contact::Sticky.across(gap, cell, of.over), plane.normal)
         })
         .collect();
     if demands.iter().any(|(bounds, _)| bounds.least == 0.0) { Vec::new() } else { demands }
@@ -95,7 +95,7 @@ impl<const D: usize> Solver<D> {
         let colliders = &physics.colliders;
         let on_nodes = || colliders.iter().filter(|collider| collider.acts_on_nodes());
         let at_feet = |collider: &Collider<D>| physics.acts_at_feet(field, collider);
-        let firm = physics.is_firm(field).then_some(field);
+        let firm = physics.moves_until_it_yields(field).then_some(field);
         let is_any =
             on_nodes().count() > usize::from(firm.is_none()) || on_nodes().any(|collider| !at_feet(collider));
         let Some(lengths) = self.grid.walls.known_over.filter(|_| is_any) else { return };
@@ -160,7 +160,7 @@ fn hold<const D: usize>(
     at_feet: impl Fn(&Collider<D>) -> bool + Sync,
 ) -> Vec<Touch<D>> {
     let Grid { fields, inside_still, inside_moving, plan, solids, .. } = grid;
-    let known = |asks: bool| asks.then(|| &solids[of.field].field.fields.rows[..]);
+    let known = |asks: bool| asks.then(|| solids[of.field].at_walls());
     let (sums, gaps) = (known(of.yields), known(of.moves));
     let all = [&*inside_still, &*inside_moving];
     let blocks = fields.rows.par_chunks_mut(block_nodes(D)).zip(&plan.blocks).zip(&fields.active);

@@ -1,5 +1,5 @@
 //! Feet: the places of a collider's surface at which it holds the nodes behind it.
-use crate::boundary::{Bounds, Contact, Touching, gap};
+use crate::boundary::{Contact, Touching, gap};
 use crate::grid::GridPlan;
 use crate::grid::leaf_geometry::leaf_box;
 use crate::grid::mask::{block_nodes, node_of_bit, offset, offset_count, offset_index};
@@ -200,7 +200,7 @@ impl<const D: usize> Foot<D> {
     ) -> Option<f64> {
         let (mut sum, mut area, mut filled) = (0.0, 0.0, 0.0);
         for corner in 0..1usize << D {
-            let slope = -(0..D).fold(0.0, |sum, a| slopes[corner][a].mul_add(self.normal[a], sum));
+            let slope = gap::slope(&slopes[corner], &self.normal);
             // Constrained nodes have what their parents have, in cells twice as wide.
             let cell = if self.constrained >> corner & 1 == 1 { 2.0 * self.cell } else { self.cell };
             filled += self.weights[corner] * sizes[corner][0] / cell.powi(D as i32 - 1);
@@ -245,7 +245,7 @@ impl<const D: usize> Foot<D> {
             arm: [0.0; D],
             lever: [0.0; D],
             surface,
-            bounds: law.bounds(Bounds::across(gap, self.cell, lengths.drift, law.holds_both_ways())),
+            bounds: law.bounds(law.across(gap, self.cell, lengths.drift)),
             law,
             // Of an area of 1 m² and a density of 1 kg/m³, until these are known.
             sticking: law.cohesion() * over,

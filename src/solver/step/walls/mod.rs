@@ -98,7 +98,7 @@ impl<const D: usize> Solver<D> {
                 .zip(with_children(&self.grid.plan, meets))
                 .for_each(|(nodes, meet)| *nodes |= meet);
         }
-        self.find_volumes(&nodes, &is_asked)
+        self.find_volumes(&nodes, &is_asked, is_between)
     }
 
     /// Not collective. Nodes at surfaces that hold material back, and constrained ones that hand sums to
@@ -164,7 +164,7 @@ impl<const D: usize> Solver<D> {
         let Some(lengths) = self.grid.walls.known_over.filter(|_| self.has_feet(field)) else { return };
         let physics = &self.physics;
         let acts = |number: usize| physics.acts_at_feet(field, &physics.colliders[number]);
-        let firm = physics.is_firm(field).then_some(field);
+        let firm = physics.moves_until_it_yields(field).then_some(field);
         let mut all = self
             .phases
             .time(Phase::Nodes, || self.grid.feet(&physics.colliders, &self.contacts.states, firm, acts));

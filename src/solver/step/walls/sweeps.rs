@@ -4,7 +4,7 @@ use rayon::prelude::*;
 use super::at_nodes::{has_yielded, is_at_another, obey};
 use super::feet::LeafFeet;
 use crate::boundary::motion::Rate;
-use crate::boundary::{Bounds, Collider, ColliderState};
+use crate::boundary::{Bounds, Collider, ColliderState, gap};
 use crate::exact_sum::ExactSum;
 use crate::grid::Window;
 use crate::grid::mask::block_nodes;
@@ -36,7 +36,7 @@ impl<const D: usize> Grid<D> {
         acts: impl Fn(usize) -> bool + Sync,
     ) -> Vec<LeafFeet<D>> {
         let Self { plan, fields, inside_still, inside_moving, solids, .. } = self;
-        let sums = firm.map(|field| &solids[field].field.fields.rows[..]);
+        let sums = firm.map(|field| solids[field].at_walls());
         let all = [inside_still, inside_moving];
         let blocks = (0..plan.blocks.len()).into_par_iter().with_min_len(256);
         let has_feet = |block: usize| {
@@ -101,7 +101,7 @@ impl<const D: usize> Solver<D> {
         let known = !touches || self.physics.has_walls_by_area();
         let masses = &other.fields.rows;
         let sums = |node: usize| match known {
-            true => solids[field].field.fields.rows[node].0,
+            true => solids[field].at_walls()[node].0,
             false => [0.0; 4],
         };
         let cells: Vec<f64> = plan.blocks.iter().map(|block| plan.cell(block.level)).collect();
@@ -198,7 +198,7 @@ impl<const D: usize> Solver<D> {
         other: &VelocityField<D>,
     ) {
         let Grid { plan, solids, fields, arenas, .. } = &mut self.grid;
-        let (masses, sums) = (&other.fields.rows, &solids[field].field.fields.rows);
+        let (masses, sums) = (&other.fields.rows, solids[field].at_walls());
         for_real_nodes(fields, plan, |node, row| {
             let shares = masses[node].0[3] * row.0[3];
             let [x, y, z, volume] = sums[node].0;
@@ -213,7 +213,7 @@ impl<const D: usize> Solver<D> {
             for ((foot, touching), covered) in leaf.feet.iter().zip(&mut leaf.touching).zip(covered) {
                 if let Some(contact) = touching {
                     let slopes = foot.gather(&fields.rows);
-                    let area = -(0..D).fold(0.0, |sum, a| slopes[a].mul_add(foot.normal[a], sum)) / covered;
+                    let area = gap::slope(&slopes, &foot.normal) / covered;
                     contact.sticking *= area.max(0.0);
                     contact.drag *= area.max(0.0) * slopes[3] / covered;
                 }
