@@ -81,6 +81,11 @@ pub enum Meets {
 }
 
 impl Meets {
+    /// Whether it moves over gaps until it yields, if nothing forbids.
+    pub const fn yields(self) -> bool {
+        matches!(self, Self::Firm | Self::Frictional)
+    }
+
     /// Of two materials that move together: later ones go before earlier ones, but for fluids with what yields.
     pub fn together(self, other: Self) -> Self {
         match [self.min(other), self.max(other)] {

@@ -259,18 +259,13 @@ impl<const D: usize> Physics<D> {
     /// Whether it does as long as it is elastic: where no law at surfaces asks for the area of what has yielded,
     /// since the sums at nodes then leave out its slope.
     pub(in crate::solver) fn moves_until_it_yields(&self, field: usize) -> bool {
-        matches!(self.meets(field), Meets::Firm | Meets::Frictional) && !self.has_walls_by_area()
-    }
-
-    /// Laws at faces and colliders.
-    fn laws_at_surfaces(&self) -> impl Iterator<Item = Contact> {
-        let of_colliders = self.colliders.iter().map(|collider| collider.contact);
-        self.faces.iter().flatten().copied().chain(of_colliders)
+        self.meets(field).yields() && !self.has_walls_by_area()
     }
 
     /// Whether any face or collider has a law by the area of the material at it.
     pub(in crate::solver) fn has_walls_by_area(&self) -> bool {
-        self.laws_at_surfaces().any(Contact::acts_by_area)
+        let of_colliders = self.colliders.iter().map(|collider| &collider.contact);
+        self.faces.as_flattened().iter().chain(of_colliders).any(|law| law.acts_by_area())
     }
 
     /// Whether a collider acts on a velocity field at the feet of the nodes inside it, in this stage. Cohesion

@@ -300,10 +300,10 @@ fn rest_on(law: &str, young: f64, surface: f64, collider: &str) -> [f64; 2] {
 }
 
 /// On faces and colliders of each kind, at any height between rows of nodes, with soft and stiff material, and
-/// metal, clay, rock and what cracks, as long as none has yielded, also beside a body in contact: the block lies on the surface, and its lowest rows carry its weight.
-/// Without the gap it hovers up to a cell above, and the lowest row has 6 to 23 times the stress. On `slip`
-/// colliders between rows the stress is within 6 %; nodes behind a `sticky` one hold, so that there its lowest
-/// row is right on rows alone.
+/// metal, clay, rock and what cracks, as long as none has yielded, also beside a body in contact: the block
+/// lies on the surface, and its lowest rows carry its weight. Without the gap it hovers up to a cell above, and
+/// the lowest row has 6 to 23 times the stress. On `slip` colliders between rows the stress is within 6 %;
+/// nodes behind a `sticky` one hold, so that there its lowest row is right on rows alone.
 #[test]
 fn blocks_come_to_rest_on_the_surface_with_their_weight() {
     let floor = |height: f64| {

@@ -302,7 +302,8 @@ fn a_block_on_a_turned_plane_stands_within_the_angle_of_friction() {
 }
 
 /// A block in space between a plate that presses it by 4 % and a floor: with friction it needs a force between
-/// those on a smooth and on a sticky floor. Nodes slide inwards or outwards, in directions that are little known.
+/// those on a smooth and on a sticky floor. Nodes slide inwards or outwards, in directions that are little
+/// known.
 #[test]
 fn a_pressed_block_spreads_against_friction() {
     let job = |floor: &str| {

@@ -226,11 +226,7 @@ fn held_at_nodes<const D: usize>(problem: &Problem<D>) -> Option<String> {
     let bodies = problem.bodies.iter().enumerate();
     let mut laws = problem.colliders.iter().map(|collider| collider.contact).chain(of_each_face.copied());
     let by_area = laws.any(Contact::acts_by_area);
-    let at_nodes = |meets: Meets| match meets {
-        Meets::Nodes => true,
-        Meets::Firm | Meets::Frictional => by_area,
-        Meets::Surface | Meets::Feet => false,
-    };
+    let at_nodes = |meets: Meets| meets == Meets::Nodes || (meets.yields() && by_area);
     let bodies = bodies.filter(|(number, _)| at_nodes(meets[field(*number)]));
     let names: Vec<String> = bodies.map(|(_, body)| excerpt(&body.name, NAME).into()).collect();
     match names.len() {

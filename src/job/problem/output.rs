@@ -1,4 +1,4 @@
-//! What a job says of time steps, output, checkpoints and reports.
+//! Settings of a job for time steps, output, checkpoints and reports.
 use std::path::PathBuf;
 
 use crate::io::snapshot::PointField as Field;

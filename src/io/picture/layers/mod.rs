@@ -1,4 +1,4 @@
-//! What pictures show beside the particles themselves.
+//! Layers of a picture beside the particles themselves.
 //!
 //! | file | concern |
 //! |---|---|

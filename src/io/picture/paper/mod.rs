@@ -1,4 +1,4 @@
-//! What a picture is drawn on.
+//! Paper of a picture: an image, colours and letters.
 //!
 //! | file | concern |
 //! |---|---|
