@@ -47,7 +47,7 @@ pub struct Body<const D: usize> {
     pub shape: Shape<D>,
     /// Place of the shape in the files of the job, for messages.
     pub place: Position,
-    /// Index into [`Problem::materials`].
+    /// Index into [`Problem::materials`](super::Problem::materials).
     pub material: usize,
     /// Velocity without that of rotation, m/s; it may depend on the place.
     pub velocity: [Quantity; D],
