@@ -67,8 +67,7 @@ pub enum Meets {
     /// At its surface, once it has moved over the gap.
     #[default]
     Surface,
-    /// At its surface as long as it is elastic, wherever it is at the nodes once it has yielded: metals and
-    /// clay.
+    /// At its surface as long as it is elastic, wherever it is once it has yielded: metals and clay.
     Firm,
     /// The same, without ties of surface nodes: material whose strength comes from pressure or is lost in
     /// cracks, as sand, rock and snow.

@@ -1,8 +1,8 @@
 //! Nodes that colliders hold themselves, not at their feet.
 //!
 //! These are the nodes inside `sticky` colliders for solids that have come to the surface, those inside all
-//! colliders for material that has yielded, and those behind a surface that another collider covers or comes
-//! near to. Feet of both surfaces would be in one cell, and if the colliders move against each other, no
+//! colliders for what moves with a fluid and yields, and those behind a surface that another collider covers or
+//! comes near to. Feet of both surfaces would be in one cell, and if the colliders move against each other, no
 //! velocity of its corners obeys both.
 use rayon::prelude::*;
 
@@ -43,12 +43,6 @@ pub(super) fn is_at_another<const D: usize>(
         let cosine = (0..D).fold(0.0, |sum, a| normal[a].mul_add(plane.normal[a], sum));
         cosine < -PARALLEL || (cosine > PARALLEL && distance < -SAME * cell)
     })
-}
-
-/// Sums by which a node behind this surface tells whether its material has yielded, by its row.
-pub(super) fn has_yielded<const D: usize>(sums: &[Row], row: usize, plane: &Plane<D>, cell: f64) -> bool {
-    let [volume, slope] = along(sums, row, plane);
-    gap::has_yielded(volume, slope, cell)
 }
 
 /// `Σ V w` and `-Σ V ∂w/∂n` of a row along the normal of a surface.
@@ -95,16 +89,13 @@ impl<const D: usize> Solver<D> {
         let colliders = &physics.colliders;
         let on_nodes = || colliders.iter().filter(|collider| collider.acts_on_nodes());
         let at_feet = |collider: &Collider<D>| physics.acts_at_feet(field, collider);
-        let firm = physics.moves_until_it_yields(field).then_some(field);
-        let is_any =
-            on_nodes().count() > usize::from(firm.is_none()) || on_nodes().any(|collider| !at_feet(collider));
+        let is_any = on_nodes().count() > 1 || on_nodes().any(|collider| !at_feet(collider));
         let Some(lengths) = self.grid.walls.known_over.filter(|_| is_any) else { return };
         let of = Known {
             field,
             coordinates: physics.coordinates,
             over: lengths.drift,
             moves: physics.moves_over_gaps(field),
-            yields: firm.is_some(),
         };
         let grid = &mut self.grid;
         self.phases.time(Phase::Nodes, || {
@@ -146,8 +137,6 @@ struct Known {
     over: f64,
     /// Whether its material moves over gaps.
     moves: bool,
-    /// Whether it does so until it yields, and is held at nodes then.
-    yields: bool,
 }
 
 /// Applies the conditions; returns impulses in the order of the nodes.
@@ -160,8 +149,7 @@ fn hold<const D: usize>(
     at_feet: impl Fn(&Collider<D>) -> bool + Sync,
 ) -> Vec<Touch<D>> {
     let Grid { fields, inside_still, inside_moving, plan, solids, .. } = grid;
-    let known = |asks: bool| asks.then(|| solids[of.field].at_walls());
-    let (sums, gaps) = (known(of.yields), known(of.moves));
+    let gaps = of.moves.then(|| solids[of.field].at_walls());
     let all = [&*inside_still, &*inside_moving];
     let blocks = fields.rows.par_chunks_mut(block_nodes(D)).zip(&plan.blocks).zip(&fields.active);
     let active = blocks.enumerate().with_min_len(32).filter(|(_, (_, active))| **active);
@@ -208,10 +196,7 @@ fn hold<const D: usize>(
                 continue;
             }
             for plane in &inside.planes {
-                let row = index * block_nodes(D) + usize::from(plane.bit);
-                if sums.is_some_and(|sums| has_yielded(sums, row, plane, cell))
-                    || is_at_another(colliders, states, number, plane, cell)
-                {
+                if is_at_another(colliders, states, number, plane, cell) {
                     hold(plane.bit.into(), &plane.normal, Bounds::TOUCHING);
                 }
             }

@@ -61,7 +61,7 @@ impl<const D: usize> LeafFeet<D> {
         inside: impl Fn(usize) -> &'a [Option<Inside<D>>],
         has_mass: impl Fn(usize) -> bool,
         acts: impl Fn(usize) -> bool,
-        acts_at_node: impl Fn(usize, usize, &Plane<D>, f64) -> bool,
+        acts_at_node: impl Fn(usize, &Plane<D>, f64) -> bool,
         normal: impl Fn(usize, &[f64; D]) -> [f64; D],
     ) -> Self {
         let number = plan.leaf_bins(leaf).start;
@@ -82,7 +82,7 @@ impl<const D: usize> LeafFeet<D> {
                 for plane in &inside.planes {
                     let row = block as usize * block_nodes(D) + usize::from(plane.bit);
                     let bit = plane.bit.into();
-                    if in_arena(bit) && has_mass(row) && !acts_at_node(collider, row, plane, cell) {
+                    if in_arena(bit) && has_mass(row) && !acts_at_node(collider, plane, cell) {
                         let node = [arena_index::<D>(index, bit), row];
                         found.feet.extend(Foot::new(plan, leaf, collider, plane.foot, plane.normal, node));
                     }
@@ -191,7 +191,8 @@ impl<const D: usize> Foot<D> {
 
     /// Gap between the surface and the material, m: the mean over the corners of the cell by the parts of the
     /// material's surface that they have. `sizes` has `Σ V w / h` of the corners in its first lanes, `slopes`
-    /// has `Σ V ∇w`. `None` where the material lies on the other side.
+    /// has `Σ V ∇w`. What has yielded touches: it has volume and no slope. `None` where the material lies on
+    /// the other side.
     pub(super) fn gap(
         &self,
         coordinates: Coordinates,
@@ -199,10 +200,13 @@ impl<const D: usize> Foot<D> {
         slopes: &[[f64; 4]; CORNERS],
     ) -> Option<f64> {
         let (mut sum, mut area, mut filled) = (0.0, 0.0, 0.0);
+        let (mut volume, mut steepness) = (0.0, 0.0);
         for corner in 0..1usize << D {
             let slope = gap::slope(&slopes[corner], &self.normal);
             // Constrained nodes have what their parents have, in cells twice as wide.
             let cell = if self.constrained >> corner & 1 == 1 { 2.0 * self.cell } else { self.cell };
+            volume += self.weights[corner] * sizes[corner][0];
+            steepness += self.weights[corner] * slope.abs();
             filled += self.weights[corner] * sizes[corner][0] / cell.powi(D as i32 - 1);
             if slope > 0.0 && self.weights[corner] > 0.0 {
                 let part = self.weights[corner] * slope;
@@ -212,6 +216,9 @@ impl<const D: usize> Foot<D> {
                 sum += part * height.mul_add(cell, above);
                 area += part;
             }
+        }
+        if gap::has_yielded(volume, steepness, 1.0) {
+            return Some(0.0);
         }
         match area > 0.0 {
             true => Some(sum / area),

@@ -164,10 +164,9 @@ impl<const D: usize> Solver<D> {
         let Some(lengths) = self.grid.walls.known_over.filter(|_| self.has_feet(field)) else { return };
         let physics = &self.physics;
         let acts = |number: usize| physics.acts_at_feet(field, &physics.colliders[number]);
-        let firm = physics.moves_until_it_yields(field).then_some(field);
         let mut all = self
             .phases
-            .time(Phase::Nodes, || self.grid.feet(&physics.colliders, &self.contacts.states, firm, acts));
+            .time(Phase::Nodes, || self.grid.feet(&physics.colliders, &self.contacts.states, acts));
         let mut other =
             self.grid.contact.take().unwrap_or_else(|| Box::new(VelocityField::new(&self.grid.plan)));
         self.grid.swap(&mut other);

@@ -1,7 +1,7 @@
 //! Between the feet and the nodes.
 use rayon::prelude::*;
 
-use super::at_nodes::{has_yielded, is_at_another, obey};
+use super::at_nodes::{is_at_another, obey};
 use super::feet::LeafFeet;
 use crate::boundary::motion::Rate;
 use crate::boundary::{Bounds, Collider, ColliderState, gap};
@@ -26,17 +26,14 @@ pub(super) type Covered = Vec<Vec<f64>>;
 
 impl<const D: usize> Grid<D> {
     /// Feet of nodes that have mass in the first velocity field, by own leaf that has any, on the colliders
-    /// whose number `acts` at feet. `firm` is the number of the velocity field, where what has yielded is held
-    /// at nodes.
+    /// whose number `acts` at feet.
     pub(super) fn feet(
         &self,
         colliders: &[Collider<D>],
         states: &[ColliderState<D>],
-        firm: Option<usize>,
         acts: impl Fn(usize) -> bool + Sync,
     ) -> Vec<LeafFeet<D>> {
-        let Self { plan, fields, inside_still, inside_moving, solids, .. } = self;
-        let sums = firm.map(|field| solids[field].at_walls());
+        let Self { plan, fields, inside_still, inside_moving, .. } = self;
         let all = [inside_still, inside_moving];
         let blocks = (0..plan.blocks.len()).into_par_iter().with_min_len(256);
         let has_feet = |block: usize| {
@@ -48,11 +45,8 @@ impl<const D: usize> Grid<D> {
             let (block, bit) = (row / block_nodes(D), row % block_nodes(D));
             plan.blocks[block].constrained >> bit & 1 == 1 || fields.rows[row].0[3] > 0.0
         };
-        let acts_at_node = |collider: usize, row: usize, plane: &Plane<D>, cell: f64| {
-            let is_constrained =
-                plan.blocks[row / block_nodes(D)].constrained >> (row % block_nodes(D)) & 1 == 1;
-            let yielded = |sums: &[Row]| !is_constrained && has_yielded(sums, row, plane, cell);
-            sums.is_some_and(yielded) || is_at_another(colliders, states, collider, plane, cell)
+        let acts_at_node = |collider: usize, plane: &Plane<D>, cell: f64| {
+            is_at_another(colliders, states, collider, plane, cell)
         };
         let normal = |collider: usize, x: &[f64; D]| colliders[collider].normal(x, &states[collider].pose);
         let leaves = (0..plan.leaf_start.len() - 1).into_par_iter().with_min_len(64);
