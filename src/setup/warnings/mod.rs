@@ -5,6 +5,7 @@
 //! | `mod.rs` | faces, angles of friction, long runs |
 //! | `colliders.rs` | thin colliders, those that overlap bodies, those outside the domain |
 //! | `damage.rs` | crack bands that are too wide |
+//! | `flow.rs` | sand whose flow the transfer slows |
 //! | `ground.rs` | unit weights, radians, gravity upwards, water and points where no ground is |
 //! | `shock.rs` | gas without what its shocks need |
 //! | `stretch.rs` | elastic bodies that are stretched further than particles follow |
@@ -20,6 +21,7 @@ use crate::text::{count, excerpt, number};
 
 mod colliders;
 mod damage;
+mod flow;
 mod ground;
 mod name;
 mod shock;
@@ -39,6 +41,7 @@ pub fn warnings<const D: usize>(problem: &Problem<D>, steps: f64) -> Vec<String>
     saturated(problem, &mut all);
     colliders::look(problem, &mut all);
     damage::look(problem, &mut all);
+    flow::look(problem, steps, &mut all);
     ground::look(problem, &mut all);
     shock::look(problem, &mut all);
     stretch::look(problem, &mut all);
@@ -222,6 +225,27 @@ colliders = [{ name = "plate", shape = { kind = "box", min = [0, 0.5], max = [1,
         }
         let found = of(&[], 12_345_678.0);
         assert!(found.len() == 1 && found[0].contains("12 345 678 steps"), "{found:?}");
+    }
+
+    /// A column 8 cells high falls in 677 of 3,000 steps.
+    #[test]
+    fn sand_that_apic_slows_is_told() {
+        let column = [
+            ("dimension = 2", "dimension = 2\ngravity = [0, -9.81]"),
+            ("max = [1, 0.5]", "max = [0.4, 0.5]"),
+            ("colliders = ", "# colliders = "),
+        ];
+        let found = of(&column, 3000.0);
+        let expected =
+            "bodies[0]: \"b\" has a free side and 8 cells in its height, and falls in about 680 steps; ";
+        assert!(found.len() == 1 && found[0].starts_with(expected), "{found:?}");
+        assert!(found[0].contains("about 27 % less far"), "{found:?}");
+        let with = |change: (&'static str, &'static str)| of(&[&column[..], &[change]].concat(), 3000.0);
+        let flip = ("version = 1", "version = 1\nnumerics = { transfer = \"flip\", flip = 1 }");
+        assert_eq!(with(flip), [""; 0]);
+        assert_eq!(with(("friction_angle = 30", "friction_angle = 30, cohesion = 1e3")), [""; 0]);
+        assert_eq!(with(("max = [0.4, 0.5]", "max = [0.6, 0.5]")), [""; 0], "a face within its height");
+        assert_eq!(of(&column, 1000.0), [""; 0], "few steps");
     }
 
     /// A plate of one coarse cell is thick enough where a criterion or a region makes the cells fine.
