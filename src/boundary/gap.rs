@@ -46,7 +46,7 @@ pub fn slope<const D: usize>(gradient: &[f64; 4], normal: &[f64; D]) -> f64 {
 /// that strikes a face would spread too little.
 const YIELDED: f64 = 0.02;
 
-/// Volume over slope and cell from which on material that has yielded is all there is.
+/// Size over slope from which on material that has yielded is all there is.
 const ALL: f64 = 2.0;
 
 /// Share of the slope that material with this plastic strain gives: without slope it is all round the node
@@ -55,10 +55,10 @@ pub fn elastic_share(plastic_strain: f64) -> f64 {
     1.0 - (plastic_strain / YIELDED).clamp(0.0, 1.0)
 }
 
-/// Whether the material at a node with these sums (m³, m²) and cells of this edge (m) has yielded, as far as
-/// it ends towards the surface.
-pub fn has_yielded(volume: f64, slope: f64, cell: f64) -> bool {
-    volume > ALL * cell * slope.max(0.0)
+/// Whether the material at a surface has yielded, from its volume over the edge of the cells and its slope to
+/// either side, m²: what has yielded has volume and no slope.
+pub fn has_yielded(size: f64, slope: f64) -> bool {
+    size > ALL * slope
 }
 
 /// Where the material of a velocity field meets faces, and colliders that act on nodes.

@@ -311,6 +311,12 @@ impl<const D: usize> Problem<D> {
         self.tree.regions.iter().map(|region| region.level).fold(self.tree.base_level, u8::max)
     }
 
+    /// The finest level that the job asks for or a criterion of refinement may.
+    pub fn finest_level_refined(&self) -> u8 {
+        let refined = self.adaptivity.as_ref().map_or(0, Adaptivity::finest_level);
+        self.finest_level().max(refined)
+    }
+
     /// True when the job asks for a finer leaf: a region that it crosses or lies in asks for a deeper level.
     pub fn wants_refinement(&self, octant: &Octant<D>) -> bool {
         let regions = self.tree.regions.iter().map(|region| (&region.shape, region.level));

@@ -184,9 +184,7 @@ pub fn estimate<const D: usize>(problem: &Problem<D>) -> Result<Estimate, Estima
 /// # Errors
 /// One of them is not a finite number above 0.
 pub fn steps<const D: usize>(problem: &Problem<D>) -> Result<(f64, f64), EstimateError> {
-    let criteria = problem.adaptivity.iter().flat_map(|adaptivity| &adaptivity.criteria);
-    let finest = criteria.map(|criterion| criterion.level).fold(problem.finest_level(), u8::max);
-    let time_step = time_step(problem, finest);
+    let time_step = time_step(problem, problem.finest_level_refined());
     check_finite(problem)?;
     let steps = (problem.time.end / time_step).ceil();
     if time_step.is_finite() && time_step > 0.0 && steps.is_finite() {

@@ -29,8 +29,7 @@ pub(super) fn look<const D: usize>(problem: &Problem<D>, steps: f64, all: &mut V
         if weight <= 0.0 || !is_sand || !has_free_side(problem, body, &bounds, height) {
             continue;
         }
-        let refined = problem.adaptivity.as_ref().map_or(0, |adaptivity| adaptivity.finest_level());
-        let cells = height / problem.cell_edge(problem.finest_level().max(refined));
+        let cells = height / problem.cell_edge(problem.finest_level_refined());
         let fall = (height / weight).sqrt() * steps / problem.time.end;
         let loss = LOSS / cells * (fall / FEW_STEPS).log10();
         if loss >= NOTABLE {

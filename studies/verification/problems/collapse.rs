@@ -243,8 +243,8 @@ impl Columns {
                 continue;
             }
             let other = self.collapse(runs, aspect, halvings, &[]);
-            let ours = found.iter().find(|point| point[0] == aspect).map_or(f64::NAN, |point| point[1]);
-            page.line(&format!("collapse.{}.cells.{aspect}", self.name), (other.runout / ours - 1.0).abs());
+            let change = other.runout / runout_of(&found, aspect) - 1.0;
+            page.line(&format!("collapse.{}.cells.{aspect}", self.name), change.abs());
             rows.push(self.row(cells(halvings), aspect, &other));
         }
         if self.dimension == 3 {
@@ -273,6 +273,11 @@ impl Columns {
     }
 }
 
+/// The run-out of the column of this height over radius.
+fn runout_of(found: &[[f64; 2]], aspect: f64) -> f64 {
+    found.iter().find(|point| point[0] == aspect).map_or(f64::NAN, |point| point[1])
+}
+
 /// Words for cells of `radius / 16 * 2^-halvings`.
 fn cells(halvings: i32) -> &'static str {
     match halvings {
@@ -283,14 +288,14 @@ fn cells(halvings: i32) -> &'static str {
     }
 }
 
-/// Low columns as bodies of revolution, which have cells of half the size in seconds; `space` are height over radius and run-out in space.
+/// Low columns as bodies of revolution, which have cells of half the size in seconds; `space` has height over
+/// radius and run-out of those in space.
 fn rings(runs: &Runs, page: &mut Page, space: &[[f64; 2]]) -> Vec<Vec<String>> {
     let mut rows = Vec::new();
     let (mut off, mut change): (f64, f64) = (0.0, 0.0);
     for &aspect in RINGS.aspects {
         let [coarse, fine] = [0, 1].map(|finer| RINGS.collapse(runs, aspect, finer, &[]));
-        let found = space.iter().find(|point| point[0] == aspect).map_or(f64::NAN, |point| point[1]);
-        off = off.max((found / coarse.runout - 1.0).abs());
+        off = off.max((runout_of(space, aspect) / coarse.runout - 1.0).abs());
         change = change.max((fine.runout / coarse.runout - 1.0).abs());
         rows.extend(
             [(0, coarse), (1, fine)].map(|(finer, deposit)| RINGS.row(cells(finer), aspect, &deposit)),

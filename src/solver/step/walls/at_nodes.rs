@@ -1,9 +1,9 @@
 //! Nodes that colliders hold themselves, not at their feet.
 //!
 //! These are the nodes inside `sticky` colliders for solids that have come to the surface, those inside all
-//! colliders for what moves with a fluid and yields, and those behind a surface that another collider covers or
-//! comes near to. Feet of both surfaces would be in one cell, and if the colliders move against each other, no
-//! velocity of its corners obeys both.
+//! colliders for what yields, if a fluid moves with it or other surfaces have laws by area, and those behind a
+//! surface that another collider covers or comes near to. Feet of both surfaces would be in one cell, and if
+//! the colliders move against each other, no velocity of its corners obeys both.
 use rayon::prelude::*;
 
 use crate::boundary::motion::Rate;
@@ -45,12 +45,6 @@ pub(super) fn is_at_another<const D: usize>(
     })
 }
 
-/// `Σ V w` and `-Σ V ∂w/∂n` of a row along the normal of a surface.
-fn along<const D: usize>(sums: &[Row], row: usize, plane: &Plane<D>) -> [f64; 2] {
-    let of_node = sums[row].0;
-    [of_node[3], gap::slope(&of_node, &plane.normal)]
-}
-
 /// Demands of the surfaces of a `sticky` collider that the node of this bit at `x` (m), with cells of this
 /// edge (m), is behind, if the material in its row of the sums has come to none of them; none too where no
 /// surface is known.
@@ -65,10 +59,10 @@ fn open<const D: usize>(
     let planes = inside.planes.iter().filter(|plane| u32::from(plane.bit) == bit);
     let demands: Vec<_> = planes
         .map(|plane| {
-            let [volume, slope] = along(sums, row, plane);
+            let slope = gap::slope(&sums[row].0, &plane.normal);
             let above = (0..D).fold(0.0, |sum, a| (x[a] - plane.foot[a]).mul_add(plane.normal[a], sum));
             let bend = of.coordinates.bend(plane.normal[0], cell, x[0]);
-            let gap = gap::height(volume, slope, cell, bend).mul_add(cell, above);
+            let gap = gap::height(sums[row].0[3], slope, cell, bend).mul_add(cell, above);
             (Contact::Sticky.across(gap, cell, of.over), plane.normal)
         })
         .collect();

@@ -191,8 +191,7 @@ impl<const D: usize> Foot<D> {
 
     /// Gap between the surface and the material, m: the mean over the corners of the cell by the parts of the
     /// material's surface that they have. `sizes` has `Σ V w / h` of the corners in its first lanes, `slopes`
-    /// has `Σ V ∇w`. What has yielded touches: it has volume and no slope. `None` where the material lies on
-    /// the other side.
+    /// has `Σ V ∇w`. What has yielded touches. `None` where the material lies on the other side.
     pub(super) fn gap(
         &self,
         coordinates: Coordinates,
@@ -200,12 +199,12 @@ impl<const D: usize> Foot<D> {
         slopes: &[[f64; 4]; CORNERS],
     ) -> Option<f64> {
         let (mut sum, mut area, mut filled) = (0.0, 0.0, 0.0);
-        let (mut volume, mut steepness) = (0.0, 0.0);
+        let (mut size, mut steepness) = (0.0, 0.0);
         for corner in 0..1usize << D {
             let slope = gap::slope(&slopes[corner], &self.normal);
             // Constrained nodes have what their parents have, in cells twice as wide.
             let cell = if self.constrained >> corner & 1 == 1 { 2.0 * self.cell } else { self.cell };
-            volume += self.weights[corner] * sizes[corner][0];
+            size += self.weights[corner] * sizes[corner][0];
             steepness += self.weights[corner] * slope.abs();
             filled += self.weights[corner] * sizes[corner][0] / cell.powi(D as i32 - 1);
             if slope > 0.0 && self.weights[corner] > 0.0 {
@@ -217,7 +216,7 @@ impl<const D: usize> Foot<D> {
                 area += part;
             }
         }
-        if gap::has_yielded(volume, steepness, 1.0) {
+        if gap::has_yielded(size, steepness) {
             return Some(0.0);
         }
         match area > 0.0 {
