@@ -324,17 +324,15 @@ impl Advance<'_> {
             (Transfer::Apic, Some(wall)) => wall.kept_affine_velocity(&moved),
             _ => None,
         };
-        if scheme.transfer.has_affine() {
-            for k in 0..D {
-                let affine = V::columns(&sums.affine[k]);
-                for i in 0..D {
-                    let value = match (scheme.transfer, kept) {
-                        (Transfer::Tpic, _) => gradient[i][k],
-                        (_, Some(kept)) => affine[i] * kept[k],
-                        (_, None) => affine[i],
-                    };
-                    batch.store(tile, Layout::<D>::AFFINE + D * i + k, value);
-                }
+        for k in 0..D {
+            let affine = V::columns(&sums.affine[k]);
+            for i in 0..D {
+                let value = match (scheme.transfer, kept) {
+                    (Transfer::Apic, Some(kept)) => affine[i] * kept[k],
+                    (Transfer::Apic, None) => affine[i],
+                    _ => gradient[i][k],
+                };
+                batch.store(tile, Layout::<D>::AFFINE + D * i + k, value);
             }
         }
         let plastic = domain::plastic_lanes(|| index, scheme) != 0;

@@ -115,7 +115,8 @@ impl Transfer {
         matches!(self, Self::Flip { .. } | Self::Xpic { .. })
     }
 
-    /// Whether particles carry an affine matrix. Elsewhere its columns stay 0, and no kernel touches them.
+    /// Whether particles pass an affine velocity field to nodes. With the others, only splits use the
+    /// gradient that they carry.
     pub fn has_affine(self) -> bool {
         !self.has_increments()
     }

@@ -19,7 +19,7 @@ impl<const D: usize> Layout<D> {
     /// Velocity, m/s. `D` columns.
     pub const VELOCITY: usize = D;
     /// Affine state, row-major: with APIC `B = Σ w v_j ⊗ (x_j - x_p)` (m²/s), which carries the particle's
-    /// angular momentum; with TPIC the velocity gradient (1/s).
+    /// angular momentum; else the velocity gradient (1/s).
     pub const AFFINE: usize = 2 * D;
     /// Elastic left Cauchy-Green tensor b = F_e F_eᵀ. `SYMMETRIC` columns.
     pub const LEFT_CAUCHY_GREEN: usize = 2 * D + D * D;

@@ -103,9 +103,6 @@ impl<const D: usize> Solver<D> {
         solver.provide_reach(reach);
         if clock == Clock::default() {
             solver.start_from(&vec![0; solver.chunks.len()]);
-        } else if !solver.physics.transfer.has_affine() {
-            // The file may be that of a run with affine matrices.
-            let _ = solver.moments_from_affine(&[]);
         }
         solver
     }

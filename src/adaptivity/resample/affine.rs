@@ -11,8 +11,7 @@ pub(super) fn gradient<const D: usize>(
 ) -> [[f64; D]; D] {
     match transfer {
         Transfer::Apic => matrix.map(|row| std::array::from_fn(|k| row[k] / spread[k])),
-        Transfer::Tpic => *matrix,
-        Transfer::Flip { .. } | Transfer::Xpic { .. } => [[0.0; D]; D],
+        _ => *matrix,
     }
 }
 

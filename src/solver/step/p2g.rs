@@ -70,20 +70,11 @@ impl<const D: usize> Solver<D> {
         });
     }
 
-    /// Turns the affine matrices C of a new state into the `B = C D` that APIC keeps; transfers by increments
-    /// keep none. The first particles of each own leaf, as many as `done`, already have B, and so have
+    /// Turns the velocity gradients C of a new state into the `B = C D` that APIC keeps. The first particles of each own leaf, as many as `done`, already have B, and so have
     /// particles of bodies that come with it.
     pub(in crate::solver) fn moments_from_affine(&mut self, done: &[usize]) -> Result<(), BinMissing> {
-        match self.physics.transfer {
-            Transfer::Apic => {}
-            Transfer::Tpic => return Ok(()),
-            Transfer::Flip { .. } | Transfer::Xpic { .. } => {
-                for chunk in &mut self.chunks {
-                    let first = Layout::<D>::AFFINE;
-                    (first..first + D * D).for_each(|column| chunk.column_mut(column).fill(0.0));
-                }
-                return Ok(());
-            }
+        if self.physics.transfer != Transfer::Apic {
+            return Ok(());
         }
         self.sort_into_bins()?;
         self.for_each_field(|solver, _| solver.moments_of_field(done));

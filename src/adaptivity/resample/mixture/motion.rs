@@ -89,8 +89,7 @@ pub(super) fn mix_motion<const D: usize>(
     });
     let affine = match setting.scheme.transfer {
         Transfer::Apic => add(own, turning),
-        Transfer::Tpic => divide(add(boxed, turning), metric),
-        Transfer::Flip { .. } | Transfer::Xpic { .. } => [[0.0; D]; D],
+        _ => divide(add(boxed, turning), metric),
     };
     out.write(Layout::<D>::POSITION, number, &x);
     out.write(Layout::<D>::VELOCITY, number, &v);
