@@ -115,6 +115,48 @@ fn stretched_bar_has_the_force_of_the_closed_form() {
     assert!(history.column("mass").iter().all(|&mass| mass == history.column("mass")[0]));
 }
 
+/// A bar of four cells over its width between grips that part along a diagonal of the cells.
+fn diagonal() -> String {
+    let half = 0.5_f64.sqrt();
+    let turned = |[x, y]: [f64; 2]| format!("[{}, {}]", half * (x - y), half * (x + y));
+    let region = |[left, below]: [f64; 2], [right, above]: [f64; 2]| {
+        let corners = [[left, below], [right, below], [right, above], [left, above]].map(turned);
+        format!("shape = {{ kind = 'polygon', points = [{}] }}", corners.join(", "))
+    };
+    let grip = |name: &str, ends: [f64; 2], speed: f64| {
+        format!(
+            "[[colliders]]\nname = '{name}'\n{}\ncontact = {{ kind = 'sticky' }}\nmotion = {{ kind = 'steady', velocity = [{speed}, {speed}] }}\n",
+            region([ends[0], -0.7], [ends[1], 0.7])
+        )
+    };
+    format!(
+        "version = 1\ndimension = 2\n[domain]\nmin = [-3.2, -3.2]\nsize = [6.4, 6.4]\nroot_edge = 0.4\n\
+         [[materials]]\nname = 'rubber'\ndensity = 1000\nmodel = 'neo_hookean'\nyoung = 1e6\npoisson = 0.3\n\
+         [[bodies]]\nname = 'bar'\nmaterial = 'rubber'\n{}\n{}{}\
+         [time]\nend = 1\n[output]\npicture = false\nevery = 10\n[history]\nevery_steps = 5\n",
+        region([-0.5, -0.2], [0.5, 0.2]),
+        grip("left", [-1.5, -0.39], -half),
+        grip("right", [0.39, 1.5], half),
+    )
+}
+
+/// Drawn along a diagonal of the cells, a bar holds as one along an axis does: its force grows to a stretch of
+/// 3.5. With halves that part along the axes it falls from 3.1 on.
+#[test]
+fn bar_across_the_cells_holds_as_well() {
+    let (history, _) = finished(&diagonal(), "diagonal");
+    let (time, mut before) = (history.column("time"), 0.0);
+    for stretch in [1.5, 2.0, 2.5, 3.0, 3.5] {
+        let end = 0.39 * (stretch - 1.0);
+        let rows: Vec<usize> = (0..time.len()).filter(|&i| (time[i] - end).abs() < 0.015).collect();
+        let along = |i: usize| history.column("force_right_x")[i] + history.column("force_right_y")[i];
+        let force = (0.5_f64.sqrt() * rows.iter().map(|&i| along(i)).sum::<f64>() / rows.len() as f64).abs();
+        println!("{stretch}: {force:.0} N");
+        assert!(force > 1.1 * before, "{stretch}: {force} N after {before} N");
+        before = force;
+    }
+}
+
 /// Up to a stretch of a sixth nothing is halved.
 #[test]
 fn small_strains_leave_particles_whole() {

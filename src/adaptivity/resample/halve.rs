@@ -5,8 +5,9 @@
 //! from node to node costs no strain, while the tension gives energy to it: for such modes the least
 //! eigenvalue of the stiffness is negative for any tension, and the body tears (`docs/design/resampling.md`).
 //! So an elastic particle whose box has become wider than [`WIDE`] cells along an axis, and is in tension
-//! along it, becomes two, half as wide along this axis alone. Its tag says so (see
-//! [`crate::particle::halvings`]): boxes of halves tile the box of the whole. Mass, momentum and angular
+//! along it, becomes two, half as wide along this axis alone. Their centres are where the stretch has carried
+//! those of the halves of the undeformed box, at `± V d`: along the axis itself, material that is stretched on
+//! a slant would move across. Its tag says so (see [`crate::particle::halvings`]). Mass, momentum and angular
 //! momentum are kept as [`pair::part`] says.
 use super::mixture::{Group, mixtures};
 use super::split::moments::spread_on_lattice;
@@ -111,8 +112,9 @@ pub(crate) fn halve<const D: usize>(
     for (first, &(_, axis)) in pairs.into_iter().zip(&wanted) {
         let (x, half) = (chunk.position(first), half_widths(chunk, first));
         let spread = std::array::from_fn(|a| spread_on_lattice(x[a], half[a], setting.cell()));
-        let mut offset = [0.0; D];
-        offset[axis] = 0.5 * half[axis];
+        let mut middle = [0.0; D];
+        middle[axis] = 0.5 * undeformed::<D>(chunk, first)[axis];
+        let offset = stretched(chunk, first, &middle, |stretch| stretch);
         book(pair::part(chunk, setting, first, &offset, &spread));
         let grown = grown(chunk, first, &x);
         for p in [first, first + 1] {
@@ -132,17 +134,23 @@ pub(crate) fn halve<const D: usize>(
 /// undeformed: `o - V⁻¹ o` with the left stretch V and the offset o, m. What the body has turned is not
 /// known.
 fn grown<const D: usize>(chunk: &Chunk<D>, first: usize, x: &[f64; D]) -> [f64; D] {
-    let [xx, yy, zz, xy, yz, xz] = volume::symmetric(chunk, Layout::<D>::LEFT_CAUCHY_GREEN, first);
-    let axes = decompose(&[xx, yy, zz, xy, xz, yz].map(Lanes::splat), D == 2);
     let upper = chunk.position(first + 1);
-    let offset: [f64; D] = std::array::from_fn(|a| upper[a] - x[a]);
-    let mut grown = offset;
+    let offset = std::array::from_fn(|a| upper[a] - x[a]);
+    let before = stretched(chunk, first, &offset, f64::recip);
+    std::array::from_fn(|a| offset[a] - before[a])
+}
+
+/// `f(V) d` with the left stretch V of a particle.
+fn stretched<const D: usize>(chunk: &Chunk<D>, p: usize, d: &[f64; D], f: impl Fn(f64) -> f64) -> [f64; D] {
+    let [xx, yy, zz, xy, yz, xz] = volume::symmetric(chunk, Layout::<D>::LEFT_CAUCHY_GREEN, p);
+    let axes = decompose(&[xx, yy, zz, xy, xz, yz].map(Lanes::splat), D == 2);
+    let mut image = [0.0; D];
     for (value, vector) in axes.value.iter().zip(&axes.vector) {
-        let along = (0..D).map(|a| vector[a].to_array()[0] * offset[a]).sum::<f64>();
-        let before = along / value.to_array()[0].sqrt();
-        (0..D).for_each(|a| grown[a] -= before * vector[a].to_array()[0]);
+        let direction: [f64; D] = std::array::from_fn(|a| vector[a].to_array()[0]);
+        let along = (0..D).map(|a| direction[a] * d[a]).sum::<f64>() * f(value.to_array()[0].sqrt());
+        (0..D).for_each(|a| image[a] = along.mul_add(direction[a], image[a]));
     }
-    grown
+    image
 }
 
 /// Makes one again of halves that are in one chunk and no longer stretched, where their states are alike.
