@@ -192,22 +192,25 @@ fn sampling<const D: usize>(checks: &mut Checks, body: &file::Body, path: &Path)
         checks.fault(&path.key("seed"), message.into());
         return None;
     }
+    let along_leaf = f64::from(CELLS_PER_LEAF) * body.particles_per_cell;
+    let in_leaves = match body.sampling {
+        Some(file::Sampling::Fitted) => Some("fitted"),
+        Some(file::Sampling::Poisson) => Some("poisson"),
+        _ => None,
+    };
+    if let Some(name) = in_leaves.filter(|_| along_leaf.fract() != 0.0) {
+        let message = format!(
+            "found {} with sampling = \"{name}\"; expected a multiple of 0.25, for a whole number of particles along the edge of a leaf",
+            written(body.particles_per_cell)
+        );
+        checks.fault(&path.key("particles_per_cell"), message);
+        return None;
+    }
     let seed = u64::from(body.seed.unwrap_or(0));
     match body.sampling {
         None | Some(file::Sampling::Lattice) => Some(Sampling::Lattice),
         Some(file::Sampling::Fitted) => Some(Sampling::Fitted),
         Some(file::Sampling::Jittered) => Some(Sampling::Jittered(seed)),
-        Some(file::Sampling::Poisson) => {
-            let along_leaf = f64::from(CELLS_PER_LEAF) * body.particles_per_cell;
-            if along_leaf.fract() != 0.0 {
-                let message = format!(
-                    "found {} with sampling = \"poisson\"; expected a multiple of 0.25, for a whole number of particles along the edge of a leaf",
-                    written(body.particles_per_cell)
-                );
-                checks.fault(&path.key("particles_per_cell"), message);
-                return None;
-            }
-            Some(Sampling::poisson(along_leaf as usize, seed))
-        }
+        Some(file::Sampling::Poisson) => Some(Sampling::poisson(along_leaf as usize, seed)),
     }
 }

@@ -278,7 +278,7 @@ pub struct Body {
     #[schemars(range(min = 0.5, max = 8.0))]
     pub particles_per_cell: f64,
     /// How particles lie. By default on the lattice; `fitted` for balls, cylinders, cones and what is made of them, of elastic material, metal
-    /// and clay.
+    /// and clay, if `particles_per_cell` is a multiple of 0.25.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sampling: Option<Sampling>,
     /// Number that chooses one of many arrangements of `jittered` and `poisson`; 0 by default. Runs that differ in it alone show by how
@@ -311,7 +311,7 @@ pub enum Sampling {
     /// On the lattice: exact for uniform states, but material that flows shows its planes.
     Lattice,
     /// On the lattice, and where the surface of the body cuts a box of it, with the volume, the mass and the centroid of the part of the body in
-    /// the box: the masses and the frequencies of curved bodies are right.
+    /// the box: the masses and the frequencies of curved bodies are right. `particles_per_cell` is a multiple of 0.25.
     Fitted,
     /// At random, by at most 0.35 of their distance from the points of the lattice along each axis.
     Jittered,
