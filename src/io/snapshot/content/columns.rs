@@ -32,7 +32,7 @@ pub(in crate::io::snapshot) fn columns<const D: usize>() -> [Columns; 9] {
             "affine",
             D * D,
             "m²/s",
-            "Affine state, row by row: B of APIC; with TPIC the velocity gradient, 1/s.",
+            "Affine state, row by row: B of APIC; else the velocity gradient, 1/s.",
         ),
         (
             "left_cauchy_green",
