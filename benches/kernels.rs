@@ -137,6 +137,7 @@ fn gather<const D: usize>(bencher: Bencher, model: Model, distinct: usize) {
                 dilation: &[],
                 filling: None,
                 booked: &mut Booked::default(),
+                rates: None,
             };
             greatest.max(bin.whole_boxes(Select::All, Place::default()))
         })
@@ -203,6 +204,7 @@ fn g2p_3d_level_mix(bencher: Bencher, (quarters, jump): (u32, bool)) {
                 dilation: &[],
                 filling: None,
                 booked: &mut Booked::default(),
+                rates: None,
             };
             greatest.max(bin.whole_boxes(Select::List(&list), Place::default()))
         })

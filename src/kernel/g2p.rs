@@ -19,6 +19,7 @@ use super::fill::Filling;
 pub use super::gathered::{FILL_MORE, Fields, Gathered, Moments};
 use super::gathered::{Sums, mean};
 use super::leavers::Leavers;
+use super::rates::Rates;
 use super::weights::{NodeWeights, Weights};
 use super::{Coordinates, Frame, Row, Scheme, Select, SubBox, Transfer, domain};
 use crate::material::eigen::determinant;
@@ -63,6 +64,8 @@ pub struct Gather<'a, const D: usize> {
     pub filling: Option<&'a Filling<'a>>,
     /// Sums for the history: of the shifts that this gives to particles, of the work of artificial viscosity.
     pub booked: &'a mut Booked<D>,
+    /// Receives the rates of the particles, where something follows the deformation.
+    pub rates: Option<&'a mut Rates<D>>,
 }
 
 impl<const D: usize> Gather<'_, D> {
@@ -98,8 +101,8 @@ impl<const D: usize> Kernel for WholeBoxes<'_, D> {
 impl<const D: usize> WholeBoxes<'_, D> {
     #[inline(always)]
     fn advance_all<V: Vector, const AT_WALL: bool>(self) -> f64 {
-        let Gather { scratch, chunk, frame, scheme, dt, fields, leavers, dilation, filling, booked } =
-            self.bin;
+        let Gather { scratch, chunk, frame, scheme, dt, fields, dilation, filling, .. } = self.bin;
+        let Gather { leavers, booked, mut rates, .. } = self.bin;
         let batches = Batches::new(self.select, chunk, self.next);
         let (tiles, tags) = chunk.tiles_mut_and_tags();
         let (cell, extent) = (frame.cell, &frame.extent);
@@ -120,6 +123,9 @@ impl<const D: usize> WholeBoxes<'_, D> {
                 weights.soften(&factors);
             }
             sums.gather::<V>(weights, nodes, &batch, cell, fields);
+            if let Some(rates) = &mut rates {
+                batch.members().for_each(|lane| rates.note(batch.particle(lane), &sums.row(lane)));
+            }
             let update = Advance { scheme, dt, cell, dilation, filling };
             let speed = update.batch(tile, tags, &batch, &position, sums, wall, (leavers, booked));
             greatest = speed.max(greatest);

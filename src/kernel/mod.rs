@@ -21,6 +21,7 @@ mod gathered;
 pub mod hanging;
 pub mod leavers;
 pub mod p2g;
+pub mod rates;
 mod select;
 pub mod spread;
 pub mod stencil;

@@ -9,7 +9,7 @@
 //! motion.
 use super::chunk::Chunk;
 use crate::material::tensor::eigen::decompose;
-use crate::simd::{Lanes, Vector};
+use crate::simd::{Lanes, Vector, VectorMask, each};
 
 /// Components that particles carry: xx, yy, xy in plane strain, else xx, yy, zz, xy, xz, yz.
 pub const fn columns(dimension: usize) -> usize {
@@ -40,27 +40,38 @@ pub fn write<const D: usize>(chunk: &mut Chunk<D>, first: usize, p: usize, e: &C
     (0..columns(D)).for_each(|c| chunk.carried_mut(first + c)[p] = e[c]);
 }
 
-/// `e` after a step of `dt` (s) with this velocity gradient (1/s).
-pub fn after_step<const D: usize>(e: &Components, gradient: &[[f64; D]; D], dt: f64) -> Components {
-    let mut tensor = [[0.0; D]; D];
+/// `e` of a batch of particles after a step of `dt` (s) with their velocity gradients (1/s).
+pub fn after_step<V: Vector, const D: usize>(e: &[V; 6], gradient: &[[V; D]; D], dt: f64) -> [V; 6] {
+    let zero = V::splat(0.0);
+    let mut tensor = [[zero; D]; D];
     for (&(i, j), &value) in places(D).iter().zip(e) {
         (tensor[i][j], tensor[j][i]) = (value, value);
     }
     // f (1 + e) fᵀ - 1 = e + g (1 + e) + ((1 + e) + g (1 + e)) gᵀ with g = f - 1.
-    let g = gradient.map(|row| row.map(|slope| dt * slope));
-    let one_plus = |i: usize, j: usize| tensor[i][j] + if i == j { 1.0 } else { 0.0 };
-    let pushed: [[f64; D]; D] =
-        std::array::from_fn(|i| std::array::from_fn(|j| (0..D).map(|k| g[i][k] * one_plus(k, j)).sum()));
-    let mut new = [0.0; 6];
+    let g = gradient.map(|row| each(row, |slope| slope * dt));
+    let mut one_plus = tensor;
+    (0..D).for_each(|i| one_plus[i][i] += V::splat(1.0));
+    let mut pushed = [[zero; D]; D];
+    for i in 0..D {
+        for j in 0..D {
+            for k in 0..D {
+                pushed[i][j] += g[i][k] * one_plus[k][j];
+            }
+        }
+    }
+    let mut new = [zero; 6];
+    let mut greatest = zero;
     for (new, &(i, j)) in new.iter_mut().zip(places(D)) {
-        let other: f64 = (0..D).map(|k| (one_plus(i, k) + pushed[i][k]) * g[j][k]).sum();
+        let mut other = zero;
+        for k in 0..D {
+            other += (one_plus[i][k] + pushed[i][k]) * g[j][k];
+        }
         *new = tensor[i][j] + pushed[i][j] + other;
+        greatest = greatest.max(new.abs());
     }
-    let greatest = new.iter().fold(0.0, |greatest: f64, component| greatest.max(component.abs()));
-    if greatest > GREATEST {
-        new = new.map(|component| component * (GREATEST / greatest));
-    }
-    new
+    let most = V::splat(GREATEST);
+    let factor = most.lt(greatest).select(most / greatest, V::splat(1.0));
+    each(new, |component| component * factor)
 }
 
 /// `b = 1 + e`, components xx, yy, zz, xy, xz, yz.
@@ -95,6 +106,12 @@ pub fn logarithmic(dimension: usize, e: &Components) -> [f64; 6] {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// [`super::after_step`] of one particle.
+    fn after_step<const D: usize>(e: &Components, gradient: &[[f64; D]; D], dt: f64) -> Components {
+        let gradient = gradient.map(|row| row.map(Lanes::splat));
+        super::after_step(&e.map(Lanes::splat), &gradient, dt).map(|component| component.to_array()[7])
+    }
 
     /// A bar that is drawn out at a constant rate, in 2D and 3D, while it turns: `ln` of its length.
     #[test]

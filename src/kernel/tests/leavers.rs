@@ -25,6 +25,7 @@ fn leavers_are_found<const D: usize>() {
             dilation: &[],
             filling: None,
             booked: &mut Booked::default(),
+            rates: None,
         };
         bin.whole_boxes(select, Place::default());
         let moved: Vec<u32> = match select {

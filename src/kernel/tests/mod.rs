@@ -35,6 +35,7 @@ fn gather<const D: usize>(
         dilation: &[],
         filling: None,
         booked: &mut Booked::default(),
+        rates: None,
     }
     .whole_boxes(select, next)
 }

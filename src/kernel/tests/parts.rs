@@ -343,6 +343,7 @@ fn bits_do_not_depend_on_earlier_bins() {
                 dilation: &[],
                 filling: None,
                 booked: &mut Booked::default(),
+                rates: None,
             }
             .whole_boxes(Select::All, place);
             arena

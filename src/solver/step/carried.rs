@@ -15,13 +15,14 @@ use rayon::prelude::*;
 
 use crate::exact_sum::ExactSum;
 use crate::kernel::Coordinates;
+use crate::kernel::rates::Rates;
 use crate::leapfrog::Lengths;
 use crate::load::{Carried, Kind, Load, cofactor};
 use crate::particle::chunk::{Chunk, Layout, Tag};
 use crate::particle::followed::head;
 use crate::particle::strain;
 use crate::particle::volume::box_volume;
-use crate::simd::Vector;
+use crate::simd::{LANES, Lanes, Vector};
 use crate::solver::sorting::box_bounds::Widths;
 use crate::solver::sorting::box_widths::BoxWidths;
 use crate::solver::state::Solver;
@@ -355,15 +356,10 @@ pub(super) fn note_ways<const D: usize>(chunk: &Chunk<D>, pushes: &mut [Particle
     }
 }
 
-/// Adds the work of the moments of the forces on a particle, by a step with this velocity gradient, 1/s.
-pub(super) fn note_turn<const D: usize>(
-    pushes: &mut [ParticlePush<D>],
-    p: usize,
-    gradient: &[[f64; D]; D],
-    dt: f64,
-) {
-    let first = pushes.partition_point(|push| (push.particle as usize) < p);
-    for push in pushes[first..].iter_mut().take_while(|push| push.particle as usize == p) {
+/// Adds the work of the moments of the forces on particles, by a step with these rates.
+pub(super) fn note_turns<const D: usize>(pushes: &mut [ParticlePush<D>], rates: &Rates<D>, dt: f64) {
+    for push in pushes {
+        let gradient = rates.gradient(push.particle as usize);
         let components = (0..D).flat_map(|i| (0..D).map(move |k| (i, k)));
         // Of the moment P2G has the symmetric part.
         let work = components.fold(0.0, |sum, (i, k)| {
@@ -391,18 +387,43 @@ pub(super) fn add_ways<const D: usize>(chunk: &mut Chunk<D>, first: usize, start
     }
 }
 
-/// Updates the total strain that a particle carries from column `first` on, by a step with this velocity
-/// gradient (1/s).
-pub(super) fn strain<const D: usize>(
+/// Updates the total strains that particles carry from column `first` on, by a step with these rates. `added`
+/// is what the diagonal of each gradient has more, 1/s; empty for none.
+pub(super) fn follow_strain<const D: usize>(
     chunk: &mut Chunk<D>,
     first: usize,
-    p: usize,
-    gradient: &[[f64; D]; D],
+    (rates, added): (&Rates<D>, &[f64]),
     dt: f64,
 ) {
-    chunk.carry(first + strain::columns(D));
-    let e = strain::after_step(&strain::read(chunk, first, p), gradient, dt);
-    strain::write(chunk, first, p, &e);
+    let columns = strain::columns(D);
+    chunk.carry(first + columns);
+    let count = chunk.len();
+    for (tile, mut gradient) in rates.gradients().enumerate() {
+        let own = tile * LANES..count.min((tile + 1) * LANES);
+        let mut e = [Lanes::splat(0.0); 6];
+        for (c, e) in e.iter_mut().enumerate().take(columns) {
+            *e = lanes(&chunk.carried(first + c)[own.clone()]);
+        }
+        if let Some(added) = added.get(own.clone()) {
+            (0..D).for_each(|i| gradient[i][i] += lanes(added));
+        }
+        let e = strain::after_step(&e, &gradient, dt);
+        for (c, e) in e.iter().enumerate().take(columns) {
+            let to = &mut chunk.carried_mut(first + c)[own.clone()];
+            match to.first_chunk_mut::<LANES>() {
+                Some(to) => *to = *e.as_array(),
+                None => to.copy_from_slice(&e.as_array()[..own.len()]),
+            }
+        }
+    }
+}
+
+/// Up to [`LANES`] values as lanes, the others 0.
+fn lanes(values: &[f64]) -> Lanes {
+    match values.first_chunk::<LANES>() {
+        Some(whole) => Lanes::new(*whole),
+        None => Lanes::new(std::array::from_fn(|lane| values.get(lane).copied().unwrap_or(0.0))),
+    }
 }
 
 /// Whether any particle of a chunk carries forces on surfaces.
@@ -411,28 +432,29 @@ pub(super) fn has_surfaces<const D: usize>(chunk: &Chunk<D>, on_surfaces: &[&Car
     !on_surfaces.is_empty() && chunk.carried_columns() > 0 && (0..chunk.len()).any(carries)
 }
 
-/// Updates the areas that a particle carries, by a step with this velocity gradient and rate along the hoop
-/// (1/s): `da ← J f⁻ᵀ da`, `f = 1 + Δt ∇v`.
-pub(super) fn follow<const D: usize>(
+/// Updates the areas that particles carry, by a step with these rates: `da ← J f⁻ᵀ da`, `f = 1 + Δt ∇v`.
+pub(super) fn follow_areas<const D: usize>(
     chunk: &mut Chunk<D>,
     on_surfaces: &[&Carried<D>],
-    p: usize,
-    (gradient, hoop): (&[[f64; D]; D], f64),
+    rates: &Rates<D>,
     dt: f64,
 ) {
-    let around = dt.mul_add(hoop, 1.0);
-    let f = std::array::from_fn(|i| {
-        std::array::from_fn(|j| dt.mul_add(gradient[i][j], if i == j { 1.0 } else { 0.0 }))
-    });
-    let turn = cofactor::<D>(&f);
     for first in on_surfaces.iter().filter_map(|carried| carried.following()) {
-        let area: [f64; D] = std::array::from_fn(|a| chunk.carried(first + a).get(p).copied().unwrap_or(0.0));
-        if area == [0.0; D] {
-            continue;
-        }
-        for i in 0..D {
-            let turned = (0..D).fold(0.0, |sum, j| turn[i][j].mul_add(area[j], sum));
-            chunk.carried_mut(first + i)[p] = around * turned;
+        let carrying = chunk.carried(first).len();
+        for p in 0..carrying {
+            let area: [f64; D] = std::array::from_fn(|a| chunk.carried(first + a)[p]);
+            if area == [0.0; D] {
+                continue;
+            }
+            let (gradient, around) = (rates.gradient(p), dt.mul_add(rates.hoop(p), 1.0));
+            let f = std::array::from_fn(|i| {
+                std::array::from_fn(|j| dt.mul_add(gradient[i][j], if i == j { 1.0 } else { 0.0 }))
+            });
+            let turn = cofactor::<D>(&f);
+            for i in 0..D {
+                let turned = (0..D).fold(0.0, |sum, j| turn[i][j].mul_add(area[j], sum));
+                chunk.carried_mut(first + i)[p] = around * turned;
+            }
         }
     }
 }

@@ -16,6 +16,7 @@ use crate::kernel::booked::Booked;
 use crate::kernel::fill::{Filling, Flow};
 use crate::kernel::g2p::{FILL_MORE, Fields, Gathered, Moments};
 use crate::kernel::leavers::Leavers;
+use crate::kernel::rates::Rates;
 use crate::kernel::{Row, Scheme, arena_nodes, g2p};
 use crate::load::{Carried, Load};
 use crate::material::SHOCK_SUMS;
@@ -32,7 +33,9 @@ use crate::solver::state::bookings::{FAILED_SUMS, Near, ParticlePush, SourcePush
 use crate::solver::state::grid::{Grid, VelocityField};
 use crate::solver::state::leaf_data::LeafData;
 use crate::solver::state::phases::Phase;
-use crate::solver::step::carried::{add_ways, follow, has_surfaces, note_turn, note_ways, positions, strain};
+use crate::solver::step::carried::{
+    add_ways, follow_areas, follow_strain, has_surfaces, note_turns, note_ways, positions,
+};
 use crate::solver::step::contact::guard::Guard;
 use crate::solver::step::failed::{Failures, Found};
 use crate::solver::step::fill::means::MeanVolumes;
@@ -50,9 +53,10 @@ struct Scratch<const D: usize> {
     gathered: Vec<Gathered<D>>,
     leavers: Leavers<D>,
     sort: leaf_bins::Scratch,
-    /// Velocity gradients of particles and their rates along the hoop, 1/s, where they are needed ahead of or
-    /// after the advance.
-    gradients: Vec<(u32, [[f64; D]; D], f64)>,
+    /// Rates of deformation, where F-bar needs them ahead of the advance, or others after it.
+    rates: Rates<D>,
+    /// Whether others do.
+    keeps_rates: bool,
     mean_dilation: MeanDilation,
     mean_volumes: MeanVolumes,
     booked: Booked<D>,
@@ -68,7 +72,8 @@ impl<const D: usize> Default for Scratch<D> {
             gathered: Vec::new(),
             leavers: Leavers::default(),
             sort: leaf_bins::Scratch::default(),
-            gradients: Vec::new(),
+            rates: Rates::default(),
+            keeps_rates: false,
             mean_dilation: MeanDilation::default(),
             mean_volumes: MeanVolumes::default(),
             booked: Booked::default(),
@@ -318,7 +323,9 @@ impl<const D: usize> Sweep<'_, D> {
         if !in_sources.is_empty() {
             in_sources.convey(&self.conveyors, chunk, self.dt, conveyed);
             scratch.leavers.look_again(chunk, &in_sources.indices());
-            scratch.gradients.retain(|(p, ..)| !in_sources.has(*p));
+            if scratch.keeps_rates {
+                in_sources.indices().iter().for_each(|&p| scratch.rates.clear(p as usize));
+            }
         }
         if let Some(guard) = &self.guard {
             let held = guard.hold(chunk, near);
@@ -334,13 +341,11 @@ impl<const D: usize> Sweep<'_, D> {
             self.displacement.into_iter().for_each(|first| add_ways(chunk, first, &start));
         }
         note_ways(chunk, pushes);
-        for (p, mut gradient, hoop) in scratch.gradients.drain(..) {
-            let p = p as usize;
-            note_turn(pushes, p, &gradient, self.dt);
-            follow(chunk, self.on_surfaces, p, (&gradient, hoop), self.dt);
-            let added = scratch.mean_dilation.added.get(p).copied().unwrap_or(0.0);
-            (0..D).for_each(|i| gradient[i][i] += added);
-            self.tensors.iter().for_each(|&first| strain(chunk, first, p, &gradient, self.dt));
+        if scratch.keeps_rates {
+            note_turns(pushes, &scratch.rates, self.dt);
+            follow_areas(chunk, self.on_surfaces, &scratch.rates, self.dt);
+            let rates = (&scratch.rates, &scratch.mean_dilation.added[..]);
+            self.tensors.iter().for_each(|&first| follow_strain(chunk, first, rates, self.dt));
         }
         self.watch.after(chunk, self.dt, maxima);
         if self.looks_at_widths {
@@ -396,16 +401,15 @@ impl<const D: usize> Sweep<'_, D> {
     ) -> f64 {
         scratch.leavers.begin(self.borders.of_leaf(leaf));
         scratch.booked = Booked::default();
+        scratch.keeps_rates = !chunk.is_empty() && self.needs_rates(chunk);
         if chunk.is_empty() {
             return 0.0;
         }
-        scratch.gradients.clear();
-        let are_kept = self.needs_gradients(chunk);
-        if self.scheme.f_bar || are_kept {
-            self.note_gradients(scratch, leaf, chunk, bins);
+        if self.scheme.f_bar || scratch.keeps_rates {
+            scratch.rates.begin(chunk.len());
         }
-        if !are_kept {
-            scratch.gradients.clear();
+        if self.scheme.f_bar {
+            self.find_dilation(scratch, leaf, chunk, bins);
         }
         scratch.mean_volumes.find(chunk, &LeafCells::new(self.borders.of_leaf(leaf)), &self.flows);
         let mut fastest: f64 = 0.0;
@@ -462,8 +466,21 @@ impl<const D: usize> Sweep<'_, D> {
         let (fields, booked) = (&nodes, &mut scratch.booked);
         let filling = self.filling(&scratch.mean_volumes);
         let filling = filling.as_ref();
-        g2p::Gather { scratch: kernel, chunk, frame, scheme, dt, fields, leavers, dilation, filling, booked }
-            .whole_boxes(whole, next)
+        let rates = scratch.keeps_rates.then_some(&mut scratch.rates);
+        g2p::Gather {
+            scratch: kernel,
+            chunk,
+            frame,
+            scheme,
+            dt,
+            fields,
+            leavers,
+            dilation,
+            filling,
+            booked,
+            rates,
+        }
+        .whole_boxes(whole, next)
     }
 
     /// Data that keep the fluids of a leaf at their volume, if there are any.
@@ -471,26 +488,24 @@ impl<const D: usize> Sweep<'_, D> {
         self.fill.map(|_| Filling { flows: &self.flows, means: &means.of_particles })
     }
 
-    /// Records the velocity gradients of the particles of a leaf; with F-bar also the correction by the mean
-    /// rate of dilation of each cell.
-    fn note_gradients(&self, scratch: &mut Scratch<D>, leaf: usize, chunk: &Chunk<D>, bins: &OfLeaf<'_, D>) {
-        let Scratch { kernel, arena, gathered, gradients, mean_dilation, .. } = scratch;
+    /// With F-bar: the rates of the particles of a leaf, and the correction by the mean rate of dilation of each
+    /// cell.
+    fn find_dilation(&self, scratch: &mut Scratch<D>, leaf: usize, chunk: &Chunk<D>, bins: &OfLeaf<'_, D>) {
+        let Scratch { kernel, arena, gathered, rates, mean_dilation, .. } = scratch;
         for Members { source: Source { fields, arenas, .. }, lists } in self.members(leaf, bins) {
             let look = Look { plan: self.plan, fields, arenas, scheme: self.scheme };
             look.at_leaf((kernel, arena, gathered), lists, leaf, chunk, |p, gathered| {
-                gradients.push((p as u32, gathered.gradient(), gathered.hoop()));
+                rates.note(p, gathered)
             });
         }
-        if self.scheme.f_bar {
-            let cells = LeafCells::new(self.borders.of_leaf(leaf));
-            mean_dilation.begin(chunk, &cells, self.scheme.coordinates);
-            gradients.iter().for_each(|(p, gradient, hoop)| mean_dilation.note(*p as usize, gradient, *hoop));
-            mean_dilation.average(chunk);
-        }
+        let cells = LeafCells::new(self.borders.of_leaf(leaf));
+        mean_dilation.begin(chunk, &cells, self.scheme.coordinates);
+        (0..chunk.len()).for_each(|p| mean_dilation.note(p, &rates.gradient(p), rates.hoop(p)));
+        mean_dilation.average(chunk);
     }
 
-    /// Whether particles of a leaf carry quantities that follow the deformation: areas or total strains.
-    fn needs_gradients(&self, chunk: &Chunk<D>) -> bool {
+    /// Whether particles of a leaf carry what follows the deformation: areas or total strains.
+    fn needs_rates(&self, chunk: &Chunk<D>) -> bool {
         !self.tensors.is_empty() || has_surfaces(chunk, self.on_surfaces)
     }
 
@@ -498,6 +513,9 @@ impl<const D: usize> Sweep<'_, D> {
     /// [`Sweep::gather`].
     fn advance_cut(&self, scratch: &mut Scratch<D>, leaf: usize, chunk: &mut Chunk<D>, cut: &[u32]) -> f64 {
         let Scratch { kernel, gathered, leavers, mean_dilation, mean_volumes, booked, .. } = scratch;
+        if scratch.keeps_rates {
+            cut.iter().zip(&*gathered).for_each(|(&p, gathered)| scratch.rates.note(p as usize, gathered));
+        }
         let (cell, extent) = (self.plan.finest_cell(leaf), self.plan.extent());
         let (scheme, dt, dilation) = (self.scheme, self.dt, &mean_dilation.added[..]);
         let filling = self.filling(mean_volumes);

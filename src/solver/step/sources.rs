@@ -65,11 +65,6 @@ impl Conveyed {
         self.particles.iter().map(|(p, _)| *p).collect()
     }
 
-    /// Whether a particle is one of them.
-    pub(super) fn has(&self, p: u32) -> bool {
-        self.particles.binary_search_by_key(&p, |(p, _)| *p).is_ok()
-    }
-
     /// Restores the state that they had before a step of length `dt` (s), moved with their sources, and
     /// records the impulse and work of that.
     pub(super) fn convey<const D: usize>(
