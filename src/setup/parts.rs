@@ -7,7 +7,7 @@
 //! alone.
 use super::lattice::{lattice_of, spacing};
 use crate::geometry::{Aabb, Sampling, Shape, Side};
-use crate::job::problem::{Body, CELLS_PER_LEAF, Problem};
+use crate::job::problem::{Body, Problem};
 
 /// Parts of a box below this share are none, and those that lack no more are whole: they come from rounding of
 /// faces that lie on the lattice.
@@ -49,13 +49,11 @@ impl<const D: usize> Point<D> {
 }
 
 /// Whether a body has the parts of its boxes, as its sampling says. Else it has the points of the lattice that
-/// it contains: also where boxes of the lattice do not lie in one leaf each, and in fluids, whose shift of
-/// volume takes the small gaps and overlaps of cut boxes for void and excess.
+/// it contains: also in fluids, whose shift of volume takes the small gaps and overlaps of cut boxes for void and
+/// excess.
 pub(super) fn has_parts<const D: usize>(problem: &Problem<D>, body: &Body<D>) -> bool {
-    let tile_leaves = (f64::from(CELLS_PER_LEAF) * body.particles_per_cell).fract() == 0.0;
     let material = &problem.materials[body.material];
-    let is_fitted = matches!(body.sampling, Sampling::Fitted);
-    is_fitted && tile_leaves && !material.build().is_fluid()
+    matches!(body.sampling, Sampling::Fitted) && !material.build().is_fluid()
 }
 
 /// Whether a body has a particle for a box of the lattice, its own or one that its part has joined.

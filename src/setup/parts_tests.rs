@@ -198,6 +198,9 @@ fn curved_solids_and_what_touches_them_are_fitted_without_a_word() {
     assert_eq!(fitted(&[("sand", disc)]), [false]);
     assert_eq!(fitted(&[("rubber", floor)]), [false]);
     assert_eq!(fitted(&[("rubber", disc), ("steel", floor)]), [true, true]);
+    // Boxes of 1 / 2.2 cells do not lie in one leaf each, so they are whole.
+    let odd = format!("{floor}\nparticles_per_cell = 2.2");
+    assert_eq!(fitted(&[("rubber", disc), ("steel", &odd)]), [false, false]);
     // The parts of a disc and the whole boxes of sand would overlap.
     assert_eq!(
         fitted(&[("sand", bed), ("rubber", far), ("rubber", disc), ("rubber", floor)]),

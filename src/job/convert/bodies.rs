@@ -48,7 +48,8 @@ fn fit_curved<const D: usize>(mut bodies: Vec<Body<D>>, file: &JobFile, space: &
         Some(sampling) => sampling == file::Sampling::Fitted,
         None => {
             let material = material_setup(&file.materials[bodies[number].material]).build();
-            material.keeps_its_shape() && bodies[number].given.is_none()
+            let is_whole = particles_per_leaf(bodies[number].particles_per_cell).fract() == 0.0;
+            material.keeps_its_shape() && bodies[number].given.is_none() && is_whole
         }
     };
     let can_be: Vec<bool> = (0..bodies.len()).map(can_be).collect();
@@ -192,7 +193,7 @@ fn sampling<const D: usize>(checks: &mut Checks, body: &file::Body, path: &Path)
         checks.fault(&path.key("seed"), message.into());
         return None;
     }
-    let along_leaf = f64::from(CELLS_PER_LEAF) * body.particles_per_cell;
+    let along_leaf = particles_per_leaf(body.particles_per_cell);
     let in_leaves = match body.sampling {
         Some(file::Sampling::Fitted) => Some("fitted"),
         Some(file::Sampling::Poisson) => Some("poisson"),

@@ -38,6 +38,11 @@ pub use stage::{FactorSearch, InStages, Stage};
 /// Cells along the edge of a leaf.
 pub const CELLS_PER_LEAF: u32 = 4;
 
+/// Particles along the edge of a leaf. Where this is a whole number, the box of each lies in one leaf.
+pub fn particles_per_leaf(particles_per_cell: f64) -> f64 {
+    f64::from(CELLS_PER_LEAF) * particles_per_cell
+}
+
 /// A checked job of either dimension.
 #[derive(Clone, Debug)]
 pub enum AnyProblem {
