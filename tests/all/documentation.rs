@@ -108,6 +108,8 @@ fn shortened(job: &str) -> String {
             ("time", "end", Some(time)) | ("stages", "duration", Some(time)) => {
                 writeln!(short, "{} = {:e}", key.trim(), time / 100.0)
             }
+            // Neighbours are a cell apart now, which is no gap yet.
+            (_, "split_gap", Some(gap)) if !has_points => writeln!(short, "split_gap = {}", gap.max(1.5)),
             (_, "particles_per_cell", _) if !has_points => Ok(()),
             _ => writeln!(short, "{line}"),
         }
