@@ -111,6 +111,7 @@ fn over_a_ball() {
 
 /// As [`over_a_ball`], but slower, so that the ball does not reach a wall.
 #[test]
+#[ignore = "nightly: takes five minutes"]
 fn over_a_ball_a_thousand_times() {
     let body = ball([0.2, 0.1, -0.15]);
     on_ranks(module_path!(), "over_a_ball_a_thousand_times", &[1], |comm| {
