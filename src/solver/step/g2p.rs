@@ -33,9 +33,10 @@ use crate::solver::state::bookings::{FAILED_SUMS, Near, ParticlePush, SourcePush
 use crate::solver::state::grid::{Grid, VelocityField};
 use crate::solver::state::leaf_data::LeafData;
 use crate::solver::state::phases::Phase;
-use crate::solver::step::carried::{
-    add_ways, follow_areas, follow_strain, has_surfaces, note_turns, note_ways, positions,
+use crate::solver::step::carried::follow::{
+    add_ways, follow_areas, follow_strain, note_turns, note_ways, positions,
 };
+use crate::solver::step::carried::has_surfaces;
 use crate::solver::step::contact::guard::Guard;
 use crate::solver::step::failed::{Failures, Found};
 use crate::solver::step::fill::means::MeanVolumes;
