@@ -49,8 +49,8 @@ impl<const D: usize> Point<D> {
 }
 
 /// Whether a body has the parts of its boxes, as its sampling says. Else it has the points of the lattice that
-/// it contains: also in fluids, whose shift of volume takes the small gaps and overlaps of cut boxes for void and
-/// excess.
+/// it contains, and so do fluids, whose shift of volume takes the small gaps and overlaps of cut boxes for void
+/// and excess.
 pub(super) fn has_parts<const D: usize>(problem: &Problem<D>, body: &Body<D>) -> bool {
     let material = &problem.materials[body.material];
     matches!(body.sampling, Sampling::Fitted) && !material.build().is_fluid()

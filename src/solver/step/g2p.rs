@@ -323,9 +323,10 @@ impl<const D: usize> Sweep<'_, D> {
         conveyed.clear();
         if !in_sources.is_empty() {
             in_sources.convey(&self.conveyors, chunk, self.dt, conveyed);
-            scratch.leavers.look_again(chunk, &in_sources.indices());
+            let moved = in_sources.indices();
+            scratch.leavers.look_again(chunk, &moved);
             if scratch.keeps_rates {
-                in_sources.indices().iter().for_each(|&p| scratch.rates.clear(p as usize));
+                moved.iter().for_each(|&p| scratch.rates.clear(p as usize));
             }
         }
         if let Some(guard) = &self.guard {
@@ -467,7 +468,7 @@ impl<const D: usize> Sweep<'_, D> {
         let (fields, booked) = (&nodes, &mut scratch.booked);
         let filling = self.filling(&scratch.mean_volumes);
         let filling = filling.as_ref();
-        let rates = scratch.keeps_rates.then_some(&mut scratch.rates);
+        let rates = self.notes_rates(scratch.keeps_rates).then_some(&mut scratch.rates);
         g2p::Gather {
             scratch: kernel,
             chunk,
@@ -510,11 +511,16 @@ impl<const D: usize> Sweep<'_, D> {
         !self.tensors.is_empty() || has_surfaces(chunk, self.on_surfaces)
     }
 
+    /// Whether the gather of the advance notes the rates that a leaf keeps: with F-bar they are known before.
+    fn notes_rates(&self, keeps_rates: bool) -> bool {
+        keeps_rates && !self.scheme.f_bar
+    }
+
     /// Advances the particles whose boxes are cut, once all parts have gathered. Returns as
     /// [`Sweep::gather`].
     fn advance_cut(&self, scratch: &mut Scratch<D>, leaf: usize, chunk: &mut Chunk<D>, cut: &[u32]) -> f64 {
         let Scratch { kernel, gathered, leavers, mean_dilation, mean_volumes, booked, .. } = scratch;
-        if scratch.keeps_rates {
+        if self.notes_rates(scratch.keeps_rates) {
             cut.iter().zip(&*gathered).for_each(|(&p, gathered)| scratch.rates.note(p as usize, gathered));
         }
         let (cell, extent) = (self.plan.finest_cell(leaf), self.plan.extent());
