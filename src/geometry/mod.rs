@@ -28,7 +28,7 @@ pub mod sampling;
 mod shape;
 pub mod surface;
 mod thick;
-pub(crate) mod vector;
+pub mod vector;
 pub mod written;
 
 pub use aabb::Aabb;

@@ -6,12 +6,12 @@ use std::path::Path;
 use super::hdf5_file::FileError;
 
 /// Writes a file under a temporary name, which becomes its own when it is on disk.
-pub(crate) fn write_whole(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
+pub fn write_whole(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
     write_in_pieces(path, |out| out.write_all(bytes))
 }
 
 /// [`write_whole`] with the bytes that `fill` writes, piece by piece.
-pub(crate) fn write_in_pieces(
+pub fn write_in_pieces(
     path: &Path,
     fill: impl FnOnce(&mut BufWriter<File>) -> std::io::Result<()>,
 ) -> std::io::Result<()> {
@@ -23,7 +23,7 @@ pub(crate) fn write_in_pieces(
 }
 
 /// Creates a file in the place of an old one. A symbolic link is replaced, not followed.
-pub(crate) fn create_new(path: &Path) -> std::io::Result<File> {
+pub fn create_new(path: &Path) -> std::io::Result<File> {
     match std::fs::remove_file(path) {
         Err(error) if error.kind() != std::io::ErrorKind::NotFound => Err(error),
         _ => OpenOptions::new().write(true).create_new(true).open(path),
@@ -31,6 +31,6 @@ pub(crate) fn create_new(path: &Path) -> std::io::Result<File> {
 }
 
 /// Error of the operating system, with the file and the refused operation.
-pub(super) fn system(path: &Path, action: &'static str, source: std::io::Error) -> FileError {
+pub fn system(path: &Path, action: &'static str, source: std::io::Error) -> FileError {
     FileError::System { path: path.into(), action, source }
 }

@@ -24,17 +24,24 @@ pub(super) struct Claim(Option<Held>);
 
 /// A lock file that this process holds until it drops this.
 #[derive(Debug)]
-pub(crate) struct Held {
+pub struct Held {
     file: File,
     path: PathBuf,
 }
 
 /// Why the lock was not taken.
 #[derive(Debug, thiserror::Error)]
-pub(crate) enum Refusal {
+pub enum Refusal {
     /// Another one has it.
     #[error("{}: found another {what} that writes here ({holder}); wait until it ends, or stop it", path.display())]
-    Taken { path: PathBuf, what: &'static str, holder: String },
+    Taken {
+        /// The file of the lock.
+        path: PathBuf,
+        /// What holds it.
+        what: &'static str,
+        /// Its process, as far as it is known.
+        holder: String,
+    },
     /// The file cannot be written.
     #[error(transparent)]
     File(#[from] FileError),
@@ -104,7 +111,7 @@ impl Drop for Held {
 ///
 /// # Errors
 /// Another one has it, or the file cannot be written.
-pub(crate) fn lock(path: &Path, what: &'static str) -> Result<Held, Refusal> {
+pub fn lock(path: &Path, what: &'static str) -> Result<Held, Refusal> {
     let failed = |action| move |source| FileError::System { path: path.into(), action, source };
     let started = Instant::now();
     loop {

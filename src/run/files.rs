@@ -4,8 +4,8 @@ use std::time::Instant;
 
 use super::measures::maps;
 use super::names::Names;
+use super::scene::{LastState, Scene};
 use super::{Run, RunError, restart, scene};
-use crate::io::picture;
 use crate::io::snapshot::{PointField, Scalars, ShownWater, View};
 use crate::job::Problem;
 use crate::particle::followed::Motion;
@@ -16,9 +16,7 @@ impl<const D: usize> Run<'_, D> {
     /// Collective. Draws the last state. All results are on disk by now, so a failure is only a message.
     pub(super) fn picture(&self) -> Result<Option<PathBuf>, String> {
         let problem = self.problem;
-        if !problem.output.picture {
-            return Ok(None);
-        }
+        let Some(draw) = self.draw.filter(|_| problem.output.picture) else { return Ok(None) };
         let has =
             |name: &str| self.names.histories.iter().any(|names| names.split(' ').any(|own| own == name));
         let plastic = self.solver.physics.materials.iter().any(|material| material.is_plastic());
@@ -39,9 +37,8 @@ impl<const D: usize> Run<'_, D> {
         let view = view(problem, &self.solver, &self.names, &scalars);
         let solids =
             scene::solids(&self.solver.physics.colliders, &self.solver.contacts.states, problem.origin);
-        let scene = picture::Scene { solids, boxes: Some(scene::boxes(&self.solver.physics)) };
-        picture::draw(self.comm, &view, field, &picture::Settings::new(title), scene, &path)
-            .map_err(|error| error.to_string())?;
+        let scene = Scene { solids, boxes: Some(scene::boxes(&self.solver.physics)) };
+        draw(self.comm, LastState { view, field, title, scene }, &path)?;
         Ok(Some(path))
     }
 

@@ -41,11 +41,12 @@ use self::names::Names;
 pub use self::outcome::{Effort, From, Options, Outcome, RunError, Summary};
 use self::record::Recorder;
 use self::room::Room;
+use self::scene::{Draw, Pictures};
 use self::schedule::Schedule;
 use self::stop::StopRequest;
 use crate::io::log::history::Kept;
 use crate::io::snapshot::{Outputs, directory};
-use crate::job::Problem;
+use crate::job::{AnyProblem, Problem};
 use crate::setup::{self, stages};
 use crate::solver::{Clock, Requests, Solver, StepReport};
 use crate::text::{count, quantity};
@@ -54,20 +55,36 @@ use crate::text::{count, quantity};
 /// on to a first step, whose checkpoint a queue can continue from.
 const LONG_START: Duration = Duration::from_secs(5);
 
-/// Collective. Runs a job to its end, or until it is asked to stop.
+/// Collective. Runs a job to its end, or until it is asked to stop. `pictures` draws its last state if the job
+/// wants a picture of it. Not generic, so that a program does not compile the solver anew.
 ///
 /// # Errors
 /// The same on all ranks.
-pub fn run<const D: usize>(
+pub fn run(
+    comm: &Comm,
+    problem: &AnyProblem,
+    options: &Options,
+    stop: &StopRequest,
+    pictures: Option<Pictures<'_>>,
+) -> Result<Outcome, RunError> {
+    match problem {
+        AnyProblem::Two(problem) => whole(comm, problem, options, stop, pictures.map(|all| all.two)),
+        AnyProblem::Three(problem) => whole(comm, problem, options, stop, pictures.map(|all| all.three)),
+    }
+}
+
+fn whole<const D: usize>(
     comm: &Comm,
     problem: &Problem<D>,
     options: &Options,
     stop: &StopRequest,
+    draw: Option<&Draw<D>>,
 ) -> Result<Outcome, RunError> {
     let mut run = match &options.restart {
         None => Run::start(comm, problem, options, stop)?,
         Some(from) => Run::resume(comm, problem, options, from)?,
     };
+    run.draw = draw;
     let outcome = run.advance(stop).map_err(|error| error.after(run.solver.clock));
     // Also after an error: the checkpoint on its way to disk is what the next run can start from.
     let settled = run.settle(true);
@@ -85,6 +102,7 @@ struct Run<'a, const D: usize> {
     schedule: Schedule,
     recorder: Recorder<'a, D>,
     names: Names,
+    draw: Option<&'a Draw<D>>,
     /// Step of the last output.
     output_step: Option<u64>,
     /// Until the last file has its name.
@@ -194,6 +212,7 @@ impl<'a, const D: usize> Run<'a, D> {
             solver,
             outputs,
             recorder,
+            draw: None,
             output_step,
             _claim: claim,
         })

@@ -8,7 +8,7 @@
 //! | `parts`, `carried` | particles at surfaces of fitted bodies; surfaces under loads |
 //! | `materials`, [`walls`], `water` | materials of bodies by stage; colliders that hold fluids; heads of water |
 //! | [`initial_stress`] | stress at the start |
-//! | [`estimate`], [`warnings`] | size and duration of a job; likely mistakes in it |
+//! | [`estimate`], [`warnings`], [`known`] | size and duration of a job; likely mistakes in it; both before a run |
 use std::convert::Infallible;
 
 use partition::comm::{Comm, Disagreement};
@@ -27,6 +27,7 @@ mod carried;
 mod constant;
 pub mod estimate;
 pub mod initial_stress;
+pub mod known;
 mod lattice;
 mod materials;
 mod particles;

@@ -1,7 +1,7 @@
 //! The quantities for which a scene is computed.
-use agimp::io::frame::Frame;
 use agimp::io::hdf5_file::FileError;
 use agimp::io::snapshot::PointField;
+use post::frame::Frame;
 use toml::{Table, Value};
 
 use crate::runs::Run;

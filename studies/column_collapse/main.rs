@@ -5,10 +5,10 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-use agimp::io::frame::Frame;
 use agimp::io::hdf5_file::{FileError, Reader};
 use agimp::job::problem::CollapseLaw;
 use agimp::run::at_end::collapse::{Published, published};
+use post::frame::Frame;
 
 #[path = "../common.rs"]
 mod common;

@@ -34,6 +34,8 @@ fn extended(root: &Path) -> tempfile::TempDir {
         "Cargo.lock",
         ".cargo",
         "src",
+        "post",
+        "cli",
         "partition",
         "benches",
         "jobs",
@@ -105,6 +107,6 @@ fn materials_and_criteria_are_one_file_and_one_line() {
     let filled: Vec<&str> = checked.lines().filter(|line| line.trim_start().starts_with("3 ")).collect();
     assert!(checked.contains("at the start, with the criteria") && !filled.is_empty(), "{checked}");
 
-    let tests = cargo(&["test", "--quiet", "--lib", "material::"]);
+    let tests = cargo(&["test", "--quiet", "-p", "agimp-solver", "material::"]);
     assert!(tests.contains("test result: ok"), "{tests}");
 }

@@ -7,10 +7,10 @@ use std::path::Path;
 use crate::common::boxes::gradient_sums;
 use crate::common::scenarios::{Scenario, agrees_for, report};
 use crate::common::tree::{forest_of, octants};
-use agimp::cli::weights::{CaseWeights, evaluate};
 use agimp::kernel::Transfer;
 use agimp::particle::chunk::{Chunk, Layout};
 use agimp::solver::diagnostics::given_boxes::{GivenBoxes, GivenParticle};
+use agimp::solver::diagnostics::weights::{CaseWeights, evaluate};
 use partition::{Brick, Comm, MAX_LEVEL};
 use serde_json::Value;
 

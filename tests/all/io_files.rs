@@ -7,7 +7,6 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use agimp::io::hdf5_file::{Reader, Writer};
-use agimp::io::picture::{Scene, Settings, draw};
 use agimp::io::snapshot::compare::{Difference, diff, digest};
 use agimp::io::snapshot::directory::{AtStake, at_stake, candidates, checkpoint_path, output_path};
 use agimp::io::snapshot::{self, Header, Limits, Options, Outputs, PointField, Scalars, View};
@@ -15,6 +14,7 @@ use agimp::particle::chunk::{Chunk, Layout, Tag};
 use agimp::particle::followed::Followed;
 use partition::comm::{Comm, World, is_launched};
 use partition::{Brick, Octant};
+use post::picture::{Scene, Settings, draw};
 
 /// Runs `body` on each number of ranks in a directory shared by all of them, then `after` in the test
 /// process. Each number of ranks is a new process group, as MPI starts once per process.

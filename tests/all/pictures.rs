@@ -3,8 +3,8 @@
 use std::path::Path;
 
 use crate::common::program::{RUBBER_BLOCK, RUBBER_MATERIAL, agimp, finished, succeed, told};
-use agimp::io::frame::Frame;
 use agimp::io::snapshot::PointField;
+use post::frame::Frame;
 
 /// A plate comes down on the block of rubber.
 const JOB: &str = r#"
@@ -458,7 +458,7 @@ fn an_exported_tree_is_that_of_the_run() {
         let directory = finished("tree", &job, &["--set", &levels]);
         let here = directory.path();
         let output = here.join("out/tree/tree_000002.hdf");
-        let leaves = agimp::io::frame::Leaves::of_output(&output).expect("leaves").levels;
+        let leaves = post::frame::Leaves::of_output(&output).expect("leaves").levels;
         assert!(leaves.iter().max() > leaves.iter().min(), "{leaves:?}");
         let frame = Frame::read(&output, &[], true).expect("an output");
         let particles = frame.positions.len() as f64;

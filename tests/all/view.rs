@@ -8,9 +8,9 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use crate::common::program::{RUBBER_MATERIAL, agimp, chromium, finished};
-use agimp::io::frame::{Frame, Leaves};
 use agimp::io::snapshot::PointField;
 use base64::Engine as _;
+use post::frame::{Frame, Leaves};
 use serde_json::Value;
 
 /// Half of the lower part of a domain of 1 m by 1 m is rubber that moves to the right; cells of two sizes.

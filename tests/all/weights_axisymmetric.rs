@@ -7,7 +7,7 @@ use crate::common::random::Random;
 use crate::common::scenarios::{Scenario, agrees_for, report};
 use crate::common::tree::{graded, random_leaves};
 use crate::weights_exact::{KINDS, random_box};
-use agimp::cli::weights::{CaseWeights, RingWeights, evaluate_rings};
+use agimp::solver::diagnostics::weights::{CaseWeights, RingWeights, evaluate_rings};
 use partition::{Brick, Comm};
 use serde_json::{Value, json};
 

@@ -5,7 +5,7 @@ use crate::common::exact::{UNIT, UnitBox, weights};
 use crate::common::random::Random;
 use crate::common::scenarios::{Scenario, agrees_for, report};
 use crate::common::tree::{graded, random_leaves};
-use agimp::cli::weights::{CaseWeights, evaluate};
+use agimp::solver::diagnostics::weights::{CaseWeights, evaluate};
 use partition::{Brick, Comm, Octant};
 use serde_json::json;
 

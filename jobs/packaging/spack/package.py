@@ -40,7 +40,7 @@ class Agimp(CargoPackage):
     def build_args(self):
         args = ["--locked", "--offline"]
         if self.spec.satisfies("~mpi"):
-            args.append("--no-default-features")
+            args += ["--no-default-features", "--features", "post"]
         return args
 
     def setup_build_environment(self, env):

@@ -145,7 +145,7 @@ fn to_triangle(x: &[f64; 3], corners: &[[f64; 3]; 3]) -> f64 {
 /// triangles alone.
 #[test]
 fn distances_of_a_torus_and_a_bunny_are_those_of_the_nearest_triangle() {
-    let bunny = read(std::path::Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/jobs/meshes/bunny.obj")));
+    let bunny = read(std::path::Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../jobs/meshes/bunny.obj")));
     for (name, triangles) in [("torus", torus([96, 48])), ("bunny", bunny.unwrap())] {
         let mesh = Mesh::new(triangles).unwrap();
         let (bounds, edge) = (mesh.bounds(), Raster::edge(&mesh.bounds()));

@@ -45,7 +45,7 @@ fn difference<const D: usize>(found: &Moments<D>, exact: &Moments<D>, size: f64)
 
 /// Rows of a table by shape: place of a box, volume, centre, and second moments by the volume.
 fn table<const D: usize>(name: &str) -> BTreeMap<String, Vec<([i64; D], Moments<D>)>> {
-    let path = format!("{}/tests/data/{name}", env!("CARGO_MANIFEST_DIR"));
+    let path = format!("{}/../tests/data/{name}", env!("CARGO_MANIFEST_DIR"));
     let text = std::fs::read_to_string(path).unwrap();
     let mut all: BTreeMap<String, Vec<_>> = BTreeMap::new();
     for line in text.lines().skip(1) {

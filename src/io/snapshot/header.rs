@@ -296,7 +296,7 @@ fn only<T: Copy>(file: &Reader, name: &str, values: Vec<T>) -> Result<T, FileErr
 }
 
 /// States are continued within one minor version below 1.0 and one major version from there on.
-pub(crate) fn compatible(program: &str) -> bool {
+pub fn compatible(program: &str) -> bool {
     let series = |version: &str| -> Option<(u64, u64)> {
         let mut parts = version.split('.').map(|part| part.parse().ok());
         let (major, minor) = (parts.next()??, parts.next()??);

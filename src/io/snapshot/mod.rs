@@ -22,7 +22,7 @@ use partition::comm::Comm;
 use super::hdf5_file::{FileError, Reader, Writer};
 
 pub mod compare;
-pub(crate) mod content;
+pub mod content;
 pub mod directory;
 mod given;
 pub mod header;
@@ -38,7 +38,7 @@ pub use content::state::Restored;
 use content::{state, vtkhdf};
 pub use given::particles;
 pub use header::Header;
-pub(crate) use header::compatible;
+pub use header::compatible;
 use intact::checked::{Checked, Recorded, Rows};
 use intact::commit::Unnamed;
 pub use intact::sane::Limits;

@@ -13,8 +13,9 @@
 //! | `name.rs` | how long a name they quote |
 use self::ground::foot;
 use self::name::NAME;
-use crate::job::Problem;
+use super::estimate::{EstimateError, steps};
 use crate::job::problem::{Body, Coordinates};
+use crate::job::{AnyProblem, Problem};
 use crate::material::laws::drucker_prager::FrictionMatch;
 use crate::material::parameters::Parameters;
 use crate::text::{count, excerpt, number};
@@ -53,6 +54,25 @@ pub fn warnings<const D: usize>(problem: &Problem<D>, steps: f64) -> Vec<String>
         ));
     }
     all
+}
+
+/// Not collective. Warnings about a job before its run; none unless they are `wanted`.
+///
+/// # Errors
+/// Its steps cannot be counted.
+pub fn first_warnings(problem: &AnyProblem, wanted: bool) -> Result<Vec<String>, EstimateError> {
+    match problem {
+        AnyProblem::Two(problem) => first_warnings_of(problem, wanted),
+        AnyProblem::Three(problem) => first_warnings_of(problem, wanted),
+    }
+}
+
+fn first_warnings_of<const D: usize>(
+    problem: &Problem<D>,
+    wanted: bool,
+) -> Result<Vec<String>, EstimateError> {
+    let (_, steps) = steps(problem)?;
+    Ok(if wanted { warnings(problem, steps) } else { Vec::new() })
 }
 
 /// Faces that the job does not name, if there are any.

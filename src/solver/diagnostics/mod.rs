@@ -8,3 +8,4 @@ pub mod probes;
 pub mod thrust;
 pub mod totals;
 pub mod tracks;
+pub mod weights;

@@ -62,7 +62,7 @@ pub(in crate::io::snapshot) fn over_leaf<const D: usize>(
 
 /// Principal values of a stress, the greatest first, by the Lode angle θ: `m + 2 √(J2/3) cos(θ - 2πk/3)` with
 /// `cos 3θ = (3√3/2) J3 / J2^(3/2)`. Near-equal values are good to about 1e-8 of the greatest.
-pub(crate) fn principal(stress: &[f64; 6]) -> [f64; 3] {
+pub fn principal(stress: &[f64; 6]) -> [f64; 3] {
     let (mean, j2) = (mean(stress), von_mises(stress).powi(2) / 3.0);
     if j2 == 0.0 {
         return [mean; 3];
@@ -74,7 +74,7 @@ pub(crate) fn principal(stress: &[f64; 6]) -> [f64; 3] {
 }
 
 /// Determinant of the deviator.
-pub(crate) fn third_invariant(stress: &[f64; 6]) -> f64 {
+pub fn third_invariant(stress: &[f64; 6]) -> f64 {
     let [xx, yy, zz, xy, yz, xz] = *stress;
     let mean = mean(stress);
     let [xx, yy, zz] = [xx - mean, yy - mean, zz - mean];
@@ -82,12 +82,12 @@ pub(crate) fn third_invariant(stress: &[f64; 6]) -> f64 {
 }
 
 /// A third of the trace.
-pub(crate) fn mean(stress: &[f64; 6]) -> f64 {
+pub fn mean(stress: &[f64; 6]) -> f64 {
     (stress[0] + stress[1] + stress[2]) / 3.0
 }
 
 /// √(3/2 s:s) with the deviator s.
-pub(crate) fn von_mises(stress: &[f64; 6]) -> f64 {
+pub fn von_mises(stress: &[f64; 6]) -> f64 {
     let mean = mean(stress);
     let diagonal: f64 = stress[..3].iter().map(|s| (s - mean) * (s - mean)).sum();
     let shear: f64 = stress[3..].iter().map(|s| s * s).sum();

@@ -12,7 +12,7 @@ use crate::particle::volume::{cauchy_stress, volume, volume_ratio};
 use crate::particle::{pores, strain};
 
 /// Names of the components of vectors and tensors, by their number, in the order of the files.
-pub(crate) const COMPONENTS: [&[&str]; 2] = [&["x", "y", "z"], &["xx", "yy", "zz", "xy", "yz", "xz"]];
+pub const COMPONENTS: [&[&str]; 2] = [&["x", "y", "z"], &["xx", "yy", "zz", "xy", "yz", "xz"]];
 
 /// Makes [`PointField`] of the table of fields: what it is, variant, name in job and output files, unit
 /// (empty for pure numbers), values of all particles of a view in order.
@@ -44,7 +44,7 @@ macro_rules! fields {
             }
 
             /// Values of all particles of the view, in order.
-            pub(crate) fn values<const D: usize>(self, view: &View<'_, D>) -> Values {
+            pub fn values<const D: usize>(self, view: &View<'_, D>) -> Values {
                 let values: fn(&View<'_, D>) -> Values = match self { $(Self::$field => $values,)* };
                 values(view)
             }
@@ -154,7 +154,7 @@ impl PointField {
 }
 
 /// Values of a field in the order of the particles.
-pub(crate) enum Values {
+pub enum Values {
     /// Identifiers.
     Id(Vec<u64>),
     /// Small integers.
@@ -167,7 +167,7 @@ pub(crate) enum Values {
 
 impl Values {
     /// Real numbers in single precision; integers stay as they are.
-    pub(crate) fn into_single(self) -> Self {
+    pub fn into_single(self) -> Self {
         match self {
             Self::Real(values, components) => {
                 Self::Single(values.into_iter().map(|v| v as f32).collect(), components)
@@ -178,7 +178,7 @@ impl Values {
 
     /// Infinite values as NaN. A value that follows from a finite state may overflow; programs leave NaN out
     /// of ranges of colours, and it is no reason to end a run.
-    pub(crate) fn without_infinities(mut self) -> Self {
+    pub fn without_infinities(mut self) -> Self {
         match &mut self {
             Self::Real(values, _) => {
                 values.iter_mut().filter(|v| v.is_infinite()).for_each(|v| *v = f64::NAN);
@@ -294,12 +294,12 @@ fn total_strain<const D: usize>(view: &View<'_, D>, chunk: &Chunk<D>, p: usize) 
 }
 
 /// Magnitude of the velocity, m/s.
-pub(crate) fn speed<const D: usize>(chunk: &Chunk<D>, p: usize) -> f64 {
+pub fn speed<const D: usize>(chunk: &Chunk<D>, p: usize) -> f64 {
     velocity(chunk, p).iter().map(|v| v * v).sum::<f64>().sqrt()
 }
 
 /// First history variable.
-pub(crate) fn plastic_strain<const D: usize>(chunk: &Chunk<D>, p: usize) -> f64 {
+pub fn plastic_strain<const D: usize>(chunk: &Chunk<D>, p: usize) -> f64 {
     chunk.column(Layout::<D>::PLASTIC_STRAIN)[p]
 }
 

@@ -7,8 +7,8 @@
 //! | `vtkhdf.rs` | the group `/VTKHDF`, for viewers |
 //! | `columns.rs` | the data sets with columns of particles |
 //! | `state.rs` | the group `/state`, for restarts |
-pub(crate) mod averages;
+pub mod averages;
 pub(in crate::io::snapshot) mod columns;
-pub(crate) mod fields;
+pub mod fields;
 pub(in crate::io::snapshot) mod state;
 pub(in crate::io::snapshot) mod vtkhdf;

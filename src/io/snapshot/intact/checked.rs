@@ -108,7 +108,7 @@ impl<'a> Recorded<'a> {
 }
 
 /// Reads data sets, each of which must have the checksum that the header has for it.
-pub(in crate::io) struct Checked<'a> {
+pub struct Checked<'a> {
     comm: Option<&'a Comm>,
     file: &'a Reader,
     header: &'a Header,
@@ -117,7 +117,7 @@ pub(in crate::io) struct Checked<'a> {
 
 impl<'a> Checked<'a> {
     /// For a file that is opened on all ranks of `comm`, or alone.
-    pub(crate) fn new(comm: Option<&'a Comm>, file: &'a Reader, header: &'a Header) -> Self {
+    pub fn new(comm: Option<&'a Comm>, file: &'a Reader, header: &'a Header) -> Self {
         Self { comm, file, header, sums: Vec::new() }
     }
 
@@ -151,7 +151,7 @@ impl<'a> Checked<'a> {
     }
 
     /// Not collective, for a file opened alone. Reads a whole data set of as many rows as the header says.
-    pub(crate) fn read_all<T: Element>(
+    pub fn read_all<T: Element>(
         &mut self,
         dataset: &str,
         rows: u64,
@@ -161,7 +161,7 @@ impl<'a> Checked<'a> {
     }
 
     /// Names and checksums of the data sets read, in their order.
-    pub(crate) fn into_sums(self) -> Vec<(String, u32)> {
+    pub fn into_sums(self) -> Vec<(String, u32)> {
         self.sums
     }
 }

@@ -5,6 +5,6 @@
 //! | `checked.rs` | data sets with checksums |
 //! | [`commit`] | from a written file to one on disk under its own name |
 //! | `sane.rs` | limits on the values of a state |
-pub(in crate::io) mod checked;
+pub mod checked;
 pub mod commit;
 pub(in crate::io::snapshot) mod sane;
