@@ -12,7 +12,6 @@ pub fn is_launched() -> bool {
 
 /// Not collective. Greatest number of ranks that a launcher says it has started: `mpirun` of Open MPI, that of
 /// MPICH, or `srun`.
-#[cfg_attr(feature = "mpi", allow(dead_code))] // With MPI the library itself counts its ranks.
 pub(super) fn launched_ranks() -> Option<usize> {
     let counts = ["OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "SLURM_STEP_NUM_TASKS"];
     counts.iter().filter_map(|name| std::env::var(name).ok()?.trim().parse().ok()).max()

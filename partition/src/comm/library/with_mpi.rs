@@ -9,6 +9,7 @@ use mpi::topology::SimpleCommunicator;
 use mpi::traits::{Communicator, CommunicatorCollectives, Equivalence, Root};
 
 use super::super::CommError;
+use super::super::environment::{is_launched, launched_ranks};
 use super::Operation;
 
 /// MPI, started. Fields drop in this order: the communicators before MPI.
@@ -179,7 +180,8 @@ impl Arrival {
 /// has threads already is left as it is: one of them may read the environment meanwhile.
 fn set_environment() {
     let version = mpi::environment::library_version().unwrap_or_default();
-    for &(name, value) in settings(&version) {
+    let is_alone = !is_launched() && launched_ranks().is_none();
+    for &(name, value) in settings(&version, is_alone) {
         if std::env::var_os(name).is_none() && has_one_thread() {
             // SAFETY: this is the only thread, so nothing reads or writes the environment meanwhile.
             unsafe { std::env::set_var(name, value) };
@@ -193,14 +195,22 @@ fn has_one_thread() -> bool {
     std::fs::read_dir("/proc/self/task").is_ok_and(|threads| threads.count() == 1)
 }
 
-/// Settings for the library that calls itself `version`.
-fn settings(version: &str) -> &'static [(&'static str, &'static str)] {
-    if version.starts_with("Open MPI v") {
-        // A rank that waits for a message gives its core to another rank, a thread that writes files, or
-        // another program with work. If none has any, it continues at once.
-        &[("OMPI_MCA_mpi_yield_when_idle", "1")]
-    } else {
-        &[]
+/// Settings for the library that calls itself `version`, in a process that no launcher has started if it
+/// `is_alone`.
+fn settings(version: &str, is_alone: bool) -> &'static [(&'static str, &'static str)] {
+    // A rank that waits for a message gives its core to another rank, a thread that writes files, or another
+    // program with work. If none has any, it continues at once.
+    const YIELD: (&str, &str) = ("OMPI_MCA_mpi_yield_when_idle", "1");
+    match (version.starts_with("Open MPI v"), is_alone) {
+        (false, _) => &[],
+        (true, false) => &[YIELD],
+        // One process alone needs no daemon beside it and no network, whose start takes half a second.
+        (true, true) => &[
+            YIELD,
+            ("OMPI_MCA_ess_singleton_isolated", "1"),
+            ("OMPI_MCA_btl", "self"),
+            ("OMPI_MCA_pml", "ob1"),
+        ],
     }
 }
 
@@ -219,16 +229,18 @@ mod tests {
         });
     }
 
-    /// Yielding for all versions of Open MPI; nothing for other libraries.
+    /// Yielding for all versions of Open MPI, no network for a process alone; nothing for other libraries.
     #[test]
     fn settings_fit_the_library() {
         for version in
             ["Open MPI v1.10.7, package: Debian", "Open MPI v4.1.4, ident: 4.1.4", "Open MPI v5.0.7, x"]
         {
-            assert_eq!(settings(version), [("OMPI_MCA_mpi_yield_when_idle", "1")], "{version}");
+            assert_eq!(settings(version, false), [("OMPI_MCA_mpi_yield_when_idle", "1")], "{version}");
+            let alone = settings(version, true);
+            assert!(alone.starts_with(settings(version, false)) && alone.len() == 4, "{version}");
         }
         for other in ["MPICH Version:\t4.2.1", "Intel(R) MPI Library 2021.9 for Linux* OS", ""] {
-            assert!(settings(other).is_empty(), "{other}");
+            assert!(settings(other, false).is_empty() && settings(other, true).is_empty(), "{other}");
         }
     }
 }
