@@ -7,6 +7,8 @@
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
+use crate::common::three_at_a_time;
+
 fn jobs(kind: &str) -> Vec<(PathBuf, String)> {
     let directory = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/jobs").join(kind);
     let mut files: Vec<PathBuf> = std::fs::read_dir(&directory)
@@ -70,16 +72,9 @@ fn bad_jobs_are_refused_with_place_and_remedy() {
     let commands = commands();
     assert!(commands.contains(&"check"));
     // A run starts MPI before it can refuse a job, which is mostly waiting.
-    std::thread::scope(|scope| {
-        for part in jobs.chunks(jobs.len().div_ceil(6)) {
-            let commands = &commands;
-            scope.spawn(move || {
-                for (path, text) in part {
-                    let expected = expectations(text);
-                    commands.iter().for_each(|command| assert_refused(command, path, &expected));
-                }
-            });
-        }
+    three_at_a_time(&jobs, |(path, text)| {
+        let expected = expectations(text);
+        commands.iter().for_each(|command| assert_refused(command, path, &expected));
     });
 }
 

@@ -3,6 +3,8 @@ use std::path::Path;
 use std::process::{Command, Output};
 use std::time::Instant;
 
+use crate::common::three_at_a_time;
+
 fn agimp(directory: &Path, arguments: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_agimp")).args(arguments).current_dir(directory).output().unwrap()
 }
@@ -284,7 +286,8 @@ fn elastic_bodies_stretched_further_than_they_hold_are_warned_of() {
     assert_eq!(found, [""; 0]);
 }
 
-/// The jobs of the project, and the templates, have the warnings that they are known to have: none.
+/// The jobs of the project have the warnings that they are known to have: none. So have the templates, in
+/// `command_line::templates_run_as_they_are`.
 #[test]
 fn jobs_of_the_project_have_no_warnings() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
@@ -292,18 +295,11 @@ fn jobs_of_the_project_have_no_warnings() {
         std::fs::read_dir(root.join("jobs")).unwrap().map(|entry| entry.unwrap().path()).collect();
     jobs.retain(|path| path.extension().is_some_and(|extension| extension == "toml"));
     assert!(jobs.len() >= 25);
-    let directory = tempfile::tempdir().unwrap();
-    let list = String::from_utf8(agimp(directory.path(), &["new", "--list"]).stdout).unwrap();
-    for name in list.lines().filter_map(|line| line.split_whitespace().next()) {
-        let path = directory.path().join(format!("{name}.toml"));
-        assert_eq!(agimp(directory.path(), &["new", name]).status.code(), Some(0), "{name}");
-        jobs.push(path);
-    }
-    for job in jobs {
+    three_at_a_time(jobs, |job| {
         let output = agimp(root, &["check", job.to_str().unwrap()]);
         assert_eq!(output.status.code(), Some(0), "{}", words(&output));
         assert!(!words(&output).contains("warning"), "{}: {}", job.display(), words(&output));
-    }
+    });
 }
 
 const REFUSED: &str = "job.toml:1:1: tree: found a job that takes ";
@@ -355,7 +351,7 @@ fn the_wall_time_of_a_job_is_measured() {
     let here = directory.path();
     let slow =
         [("velocity = [0.1, 0]", "velocity = [1e-3, 0]"), ("velocity = [0, -0.02]", "velocity = [0, -1e-4]")];
-    let job = changed(&[slow[0], slow[1], ("end = 2", "end = 10")]);
+    let job = changed(&[slow[0], slow[1], ("end = 2", "end = 3")]);
     std::fs::write(here.join("job.toml"), job).unwrap();
     let out = String::from_utf8(agimp(here, &["check", "job.toml"]).stdout).unwrap();
     let line = out.lines().find(|line| line.starts_with("wall time")).unwrap();

@@ -29,6 +29,24 @@ pub(crate) mod scenarios;
 pub(crate) mod spinning;
 pub(crate) mod tree;
 
+/// Does something with each item, three at a time: for programs that wait more than they compute.
+pub(crate) fn three_at_a_time<T: Send>(
+    items: impl IntoIterator<Item = T, IntoIter: Send>,
+    does: impl Fn(T) + Sync,
+) {
+    let items = std::sync::Mutex::new(items.into_iter());
+    let next = || items.lock().expect("no iterator panics").next();
+    std::thread::scope(|scope| {
+        for _ in 0..3 {
+            scope.spawn(|| {
+                while let Some(item) = next() {
+                    does(item)
+                }
+            });
+        }
+    });
+}
+
 /// Runs share few cores and some tests measure time, so they take turns.
 pub(crate) fn in_turn() -> std::sync::MutexGuard<'static, ()> {
     static TURN: std::sync::Mutex<()> = std::sync::Mutex::new(());
