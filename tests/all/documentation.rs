@@ -5,7 +5,7 @@
 //!
 //! * `target/release/agimp` is the program that cargo has built for the tests, and `cargo build` does
 //!   nothing,
-//! * jobs have one particle per cell and a hundredth of their time,
+//! * jobs have one particle per cell and a thousandth of their time,
 //! * `sbatch` and `srun` run a script on two ranks of this machine.
 //!
 //! Comments before a block say what else differs (`common/papers.rs`). Tutorials run unabridged in
@@ -13,9 +13,11 @@
 
 use crate::common::mpirun;
 use crate::common::papers;
+use crate::common::three_at_a_time;
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 use crate::common::papers::{blocks, commands, files, repository, text};
 
@@ -90,8 +92,8 @@ impl Copy {
     }
 }
 
-/// A job with one particle per cell whose stages and end come after a hundredth of their times. Forces at points need the
-/// particles that they are for.
+/// A job with one particle per cell whose stages and end come after a thousandth of their times. Forces at points
+/// need the particles that they are for.
 fn shortened(job: &str) -> String {
     let mut short = String::new();
     let mut table = "";
@@ -106,7 +108,7 @@ fn shortened(job: &str) -> String {
         let number = value.split('#').next().and_then(|value| value.trim().parse::<f64>().ok());
         match (table, key.trim(), number) {
             ("time", "end", Some(time)) | ("stages", "duration", Some(time)) => {
-                writeln!(short, "{} = {:e}", key.trim(), time / 100.0)
+                writeln!(short, "{} = {:e}", key.trim(), time / 1000.0)
             }
             // Neighbours are a cell apart now, which is no gap yet.
             (_, "split_gap", Some(gap)) if !has_points => writeln!(short, "split_gap = {}", gap.max(1.5)),
@@ -162,8 +164,8 @@ fn commands_of_the_papers_run() {
 #[test]
 fn commands_in_the_comments_of_jobs_run() {
     let environment = environment();
-    let mut jobs = 0;
-    for path in files(Path::new("jobs")) {
+    let jobs = AtomicUsize::new(0);
+    three_at_a_time(files(Path::new("jobs")), |path| {
         let commands: Vec<_> = text(&path)
             .lines()
             .filter_map(|line| line.strip_prefix("#     "))
@@ -178,9 +180,9 @@ fn commands_in_the_comments_of_jobs_run() {
         let is_job =
             path.parent() == Some(Path::new("jobs")) && path.extension().is_some_and(|e| e == "toml");
         assert!(!is_job || !commands.is_empty(), "{}: how is it run?", path.display());
-        jobs += usize::from(is_job);
-    }
-    assert!(jobs >= 7, "{jobs}");
+        jobs.fetch_add(usize::from(is_job), Ordering::Relaxed);
+    });
+    assert!(jobs.load(Ordering::Relaxed) >= 7, "{jobs:?}");
 }
 
 /// Crates of tests that commands name, in pages and in the scripts of `tests/`, are there.
