@@ -166,12 +166,12 @@ fn disks_without_friction_do_not_rub() {
 fn blocks_slide_on_slabs_as_coulomb_says() {
     for (friction, slides) in [(0.0, true), (0.3, true), (0.7, false)] {
         let job = format!(
-            "{RUBBER}[domain]\nsize = [2, 0.8]\nroot_edge = 0.2\n[boundaries]\ny_min = {{ kind = 'sticky' }}\n\
+            "{RUBBER}[domain]\nsize = [1.2, 0.8]\nroot_edge = 0.2\n[boundaries]\ny_min = {{ kind = 'sticky' }}\n\
              [tree]\nbase_level = 1\n[[tree.regions]]\nlevel = 2\nshape = {{ kind = 'box', min = [0.4, 0], max = [0.8, 0.4] }}\n{}{}\
              [[contact]]\nbetween = ['slab', 'block']\nfriction = {friction}\n\
              [[probes]]\nname = 'block'\nbodies = ['block']\nquantities = ['velocity', 'centre']\n\
              [time]\nend = 0.4\ncfl = 0.5\n[history]\nevery_steps = 20\n",
-            body("slab", &cube([0.0, 0.0], [2.0, 0.2125]), "[0, 0]"),
+            body("slab", &cube([0.0, 0.0], [1.2, 0.2125]), "[0, 0]"),
             body("block", &cube([0.2, 0.2125], [0.6, 0.5125]), "[0, 0]"),
         )
         .replace("dimension = 2\n", "dimension = 2\ngravity = ['4.905 * min(t / 0.1, 1)', '-8.4957 * min(t / 0.1, 1)']\n")
