@@ -6,14 +6,25 @@ use crate::common::launch::{run, succeed};
 use crate::common::restart;
 
 /// Mean pressure over strength under the footing of `jobs/strip_footing.toml` at a settlement of 3 to 3.5 mm.
+/// It is pressed twice as fast as there, into ground of 3.2 m by 2.4 m: wedges and fans of the theory reach
+/// 1.5 m aside and 0.7 m down.
 fn limit(f_bar: bool) -> f64 {
     let directory = tempfile::tempdir().expect("temporary directory");
     let job = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("jobs/strip_footing.toml");
     let f_bar = format!("numerics.f_bar={f_bar}");
-    succeed(&mut run(directory.path(), 1, 2, &job, &["--quiet", "--end", "0.7", "--set", &f_bar]));
+    let changes = [
+        &f_bar,
+        "domain.min=[0,2.4]",
+        "domain.size=[3.2,3.2]",
+        "bodies.ground.shape.min=[0,2.4]",
+        "bodies.ground.shape.max=[3.2,4.8]",
+        "colliders.footing.motion.velocity=[0,-0.01]",
+    ];
+    let mut command = run(directory.path(), 1, 2, &job, &["--quiet", "--end", "0.35"]);
+    succeed(command.args(changes.into_iter().flat_map(|change| ["--set", change])));
     let history = History::read(directory.path(), "strip_footing");
     let rows = history.column("time").iter().zip(history.column("force_footing_y"));
-    let late: Vec<f64> = rows.filter(|(time, _)| **time > 0.6).map(|(_, force)| force / 0.5e4).collect();
+    let late: Vec<f64> = rows.filter(|(time, _)| **time > 0.3).map(|(_, force)| force / 0.5e4).collect();
     late.iter().sum::<f64>() / late.len() as f64
 }
 
