@@ -106,7 +106,7 @@ fn ball(velocity: [f64; 3]) -> String {
 #[test]
 fn over_a_ball() {
     let body = ball([0.5, 0.2, -0.3]);
-    on_ranks(module_path!(), "over_a_ball", &[1], |comm| sweeps::<3>(comm, &body, 40, 250, 1e-2));
+    on_ranks(module_path!(), "over_a_ball", &[1], |comm| sweeps::<3>(comm, &body, 20, 125, 6e-3));
 }
 
 /// As [`over_a_ball`], but slower, so that the ball does not reach a wall.
