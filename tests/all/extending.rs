@@ -65,6 +65,18 @@ fn add(root: &Path, folder: &str, name: &str, next: &str, list: &str) {
     std::fs::write(&path, text.replacen(next, &format!("pub mod {name};\n{next}"), 1)).expect("list");
 }
 
+/// The lists to which the page adds a line are the ends of their files, where the page says that they are.
+#[test]
+fn lists_are_the_ends_of_their_files() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    for (folder, list) in [("src/material/laws", "materials!"), ("src/adaptivity/criteria", "criteria!")] {
+        let text = std::fs::read_to_string(root.join(folder).join("mod.rs")).expect("list");
+        let (_, after) = text.rsplit_once(&format!("\n{list} {{\n")).expect("the list");
+        let end = after.find("\n}").expect("the end of the list");
+        assert_eq!(&after[end..], "\n}\n", "{folder}/mod.rs goes on after {list}");
+    }
+}
+
 #[test]
 #[ignore = "nightly: compiles the crate twice"]
 fn materials_and_criteria_are_one_file_and_one_line() {

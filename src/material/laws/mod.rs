@@ -32,6 +32,8 @@ pub(in crate::material) mod metal;
 mod model;
 pub mod mohr_coulomb;
 pub mod neo_hookean;
+#[cfg(test)]
+mod tests;
 pub mod tresca;
 pub mod von_mises;
 
@@ -114,6 +116,17 @@ pub(super) trait Visitor {
     fn visit(&self, example: &str, law: &impl Law);
 }
 
+impl Parameters {
+    /// Whether particles of the material can fail: it has damage.
+    pub fn can_fail(&self) -> bool {
+        match self {
+            Self::Hencky(own) => own.damage.is_some(),
+            Self::VonMises(own) => own.damage.is_some(),
+            _ => false,
+        }
+    }
+}
+
 materials! {
     /// Compressible neo-Hookean elasticity: `τ = μ (b - I) + λ ln(J) I`.
     NeoHookean(neo_hookean::NeoHookean),
@@ -143,47 +156,4 @@ materials! {
     Gas(flow::gas::Gas),
     /// High explosive: products after Jones, Wilkins and Lee, with a burn that starts at points.
     Explosive(flow::explosive::Explosive),
-}
-
-impl Parameters {
-    /// Whether particles of the material can fail: it has damage.
-    pub fn can_fail(&self) -> bool {
-        match self {
-            Self::Hencky(own) => own.damage.is_some(),
-            Self::VonMises(own) => own.damage.is_some(),
-            _ => false,
-        }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// A strength factor divides c and tan φ; the model stays valid, and 1 changes nothing.
-    #[test]
-    fn weakened_models_are_valid_and_have_less_strength() {
-        let mut weakened = 0;
-        for text in Parameters::examples() {
-            let model: Parameters = text.parse().expect("an example");
-            let Some(weaker) = model.weakened(1.5) else { continue };
-            assert!(weaker.check().is_ok(), "{text}");
-            assert_eq!(model.weakened(1.0), Some(model.clone()), "{text}");
-            if let (Parameters::MohrCoulomb(before), Parameters::MohrCoulomb(after)) = (&model, &weaker) {
-                let [before_tan, after_tan] = [before, after].map(|p| p.friction_angle.to_radians().tan());
-                assert!((1.5 * after_tan / before_tan - 1.0).abs() < 1e-14, "{text}");
-                assert_eq!(after.cohesion, before.cohesion / 1.5);
-            }
-            let associated = weaker.associated();
-            assert!(associated.check().is_ok(), "{text}");
-            if let Parameters::MohrCoulomb(p) = &associated {
-                assert!(
-                    p.dilation_angle == p.friction_angle || p.residual_friction_angle.is_some(),
-                    "{text}"
-                );
-            }
-            weakened += 1;
-        }
-        assert!(weakened >= 15, "{weakened} models with strength");
-    }
 }
