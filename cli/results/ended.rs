@@ -1,4 +1,4 @@
-//! What a run that has ended leaves for its user: its last state as a picture, its page, commands that show more.
+//! The end of a run for its user: its last state as a picture, its page, commands that show more.
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
@@ -8,7 +8,7 @@ use agimp::text::shell_word;
 use post::picture::draw_last;
 use post::report::{self, Options, Results};
 
-/// What draws the last state.
+/// Pictures of the last state.
 pub(crate) const PICTURES: Option<Pictures<'static>> =
     Some(Pictures { two: &draw_last::<2>, three: &draw_last::<3> });
 

@@ -45,7 +45,7 @@ pub fn beside_each_other(charts: &[Chart], size: (u32, u32)) -> Result<String, S
     })
 }
 
-/// What `draw` draws, as an SVG of so many pixels.
+/// A drawing by `draw` as an SVG of so many pixels.
 fn svg(size: (u32, u32), draw: impl Fn(&Area<'_>) -> Result<(), Failure>) -> Result<String, String> {
     let mut text = String::new();
     let drawn = |text: &mut String| {

@@ -1,4 +1,5 @@
-//! What looks at the results of agimp: pictures, movies, charts, files for other programs, pages for a browser.
+//! Post-processing of the results of agimp: pictures, movies, charts, files for other programs, pages for a
+//! browser.
 //!
 //! Reads files, and of a run that ends its last state. The solver knows nothing of it, so a change here
 //! compiles none of the kernels.

@@ -37,7 +37,7 @@ pub enum Refusal {
     Taken {
         /// The file of the lock.
         path: PathBuf,
-        /// What holds it.
+        /// Kind of its holder.
         what: &'static str,
         /// Its process, as far as it is known.
         holder: String,

@@ -22,7 +22,7 @@ const SHORT: f64 = 1.4;
 /// Time that a step takes at least, s, however few particles there are; roughly.
 const SHORTEST_STEP: f64 = 1e-4;
 
-/// What is known of a job before its run.
+/// Size, cost and likely mistakes of a job, before its run.
 #[derive(Clone, Debug)]
 pub struct Known {
     /// Its size and cost.
@@ -31,7 +31,7 @@ pub struct Known {
     pub is_refined: bool,
     /// Totals of the surface and forces that particles carry, by load; empty if unknown.
     pub carried: Vec<CarriedTotals>,
-    /// Likely mistakes in the job.
+    /// Likely mistakes in the job; on rank 0.
     pub warnings: Vec<String>,
 }
 
@@ -103,7 +103,8 @@ fn known_of<const D: usize>(
             }
         }
     };
-    let warnings = warnings(problem, estimate.steps);
+    let speaks = world.as_ref().is_none_or(|world| world.comm().rank() == 0);
+    let warnings = if speaks { warnings(problem, estimate.steps) } else { Vec::new() };
     Ok(Known { estimate, is_refined: carried.is_some(), carried: carried.unwrap_or_default(), warnings })
 }
 

@@ -62,7 +62,8 @@ pub struct LastState<'a, const D: usize> {
 /// The picture cannot be written; why, in words; the same on all ranks.
 pub type Draw<const D: usize> = dyn Fn(&Comm, LastState<'_, D>, &Path) -> Result<(), String>;
 
-/// What draws the last state of a run. The solver knows no pictures: who starts a run says what draws them.
+/// Functions that draw the last state of a run. The solver knows no pictures: who starts a run says what draws
+/// them.
 #[derive(Clone, Copy)]
 pub struct Pictures<'a> {
     /// In two dimensions.
