@@ -4,9 +4,9 @@
 //! more for AVX-512: a [`Vector`] is then one register instead of two, and there are 32 of them, which
 //! batches need. Each operation is rounded as before, so results do not depend on the choice.
 use super::Vector;
-#[cfg(all(target_arch = "x86_64", target_feature = "avx2", target_feature = "fma"))]
-use super::avx512::Wide;
 use super::lanes::Lanes;
+#[cfg(all(target_arch = "x86_64", target_feature = "avx2", target_feature = "fma"))]
+use super::registers::avx512::Wide;
 
 /// Work that is worth being compiled for several instruction sets.
 pub trait Kernel {

@@ -1,4 +1,5 @@
 //! The implementations against each other.
+use super::registers::portable;
 use super::*;
 
 /// Values with all kinds of signs, sizes and special cases.

@@ -1,19 +1,20 @@
 //! [`Wide`]: a [`Vector`] as one register of AVX-512.
 use std::ops::{Add, AddAssign, BitAnd, BitOr, Div, Mul, Neg, Not, Sub};
 
+use super::F64x4;
 use super::exponent::{EXPONENT_MAGIC, FRACTION_BITS, ONE_BITS, TWO_52_BITS};
-use super::{F64x4, LANES, Vector, VectorMask};
+use crate::simd::{LANES, Vector, VectorMask};
 use core::arch::x86_64::*;
 
-/// One number for each of [`LANES`] particles. Only [`super::widest`] names it, for kernels on processors
-/// that have the instructions.
+/// One number for each of [`LANES`] particles. Only [`crate::simd::widest`] names it, for kernels on
+/// processors that have the instructions.
 #[derive(Clone, Copy, Debug)]
 #[repr(transparent)]
-pub(super) struct Wide(__m512d);
+pub(in crate::simd) struct Wide(__m512d);
 
 /// One truth value for each of [`LANES`] particles.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct WideMask(__mmask8);
+pub(in crate::simd) struct WideMask(__mmask8);
 
 /// Calls intrinsics on registers.
 macro_rules! intrinsic {
