@@ -6,37 +6,29 @@
 //!
 //! | file or folder | what it holds |
 //! |---|---|
-//! | `aabb`, `frustum`, `shape` | axis-aligned boxes; truncated cones; shapes and their queries |
-//! | `primitives`, `gradient`, `thick` | distances of the primitives; their gradient; whether a solid is thick everywhere |
-//! | `classify`, `common_point` | on which side of a shape a box lies; a point that two shapes share |
+//! | `aabb`, `frustum` | axis-aligned boxes; truncated cones |
+//! | `shape/` | shapes and their queries |
 //! | [`moments`], `part/` | volume and inertia of shapes, and of their parts in boxes |
 //! | [`mesh`] | solids from triangles and rasters |
 //! | [`sampling`], [`surface`] | particles off the lattice; pieces of surface |
 //! | [`written`] | shapes as they stand in a job |
 //! | `rotation`, `vector` | rotations; vectors of space |
 mod aabb;
-mod classify;
-mod common_point;
 mod frustum;
-mod gradient;
 pub mod mesh;
 pub mod moments;
 mod part;
-mod primitives;
 mod rotation;
 pub mod sampling;
 mod shape;
 pub mod surface;
-mod thick;
 pub mod vector;
 pub mod written;
 
 pub use aabb::Aabb;
-pub use classify::Side;
-pub use common_point::common_point;
 pub use frustum::Frustum;
 pub use mesh::Mesh;
 pub use moments::Moments;
 pub use rotation::rotation;
 pub use sampling::Sampling;
-pub use shape::{Placement, Shape};
+pub use shape::{Placement, Shape, Side, common_point};

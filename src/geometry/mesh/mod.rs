@@ -24,7 +24,7 @@ use parry3d_f64::query::PointQuery;
 use parry3d_f64::shape::{TriMesh, TriMeshFlags};
 
 use super::Aabb;
-use super::primitives::box_distance;
+use super::shape::primitives::box_distance;
 use crate::checksum::fnv1a;
 
 mod crossing;

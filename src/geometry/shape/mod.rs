@@ -1,9 +1,25 @@
 //! The shape type and its queries.
-use super::primitives::{
+//!
+//! | file | what it holds |
+//! |---|---|
+//! | this | the type; its distance, membership and bounds |
+//! | `primitives`, `gradient` | distances of the primitives; the gradient of the distance |
+//! | `classify`, `common_point` | on which side of a shape a box lies; a point that two shapes share |
+//! | `thick` | whether a solid is thick everywhere |
+use self::primitives::{
     box_distance, frustum_distance, half_space_distance, polygon_distance, sphere_distance,
 };
-use super::vector::in_space;
-use super::{Aabb, Frustum, Mesh};
+use crate::geometry::vector::in_space;
+use crate::geometry::{Aabb, Frustum, Mesh};
+
+mod classify;
+mod common_point;
+mod gradient;
+pub(super) mod primitives;
+mod thick;
+
+pub use classify::Side;
+pub use common_point::common_point;
 
 /// A rotation about a point, from the shape's own frame to space: `x = R (y - pivot) + pivot`.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -1,5 +1,5 @@
 //! Exact signed distances of the primitives.
-use super::{Aabb, Frustum};
+use crate::geometry::{Aabb, Frustum};
 
 fn norm(components: impl Iterator<Item = f64>) -> f64 {
     components.map(|c| c * c).sum::<f64>().sqrt()
@@ -7,7 +7,7 @@ fn norm(components: impl Iterator<Item = f64>) -> f64 {
 
 /// Distance to an axis-aligned box: per axis the excess over the half width; outside the excesses add
 /// as a vector, inside the nearest face counts.
-pub(super) fn box_distance<const D: usize>(aabb: &Aabb<D>, x: &[f64; D]) -> f64 {
+pub(in crate::geometry) fn box_distance<const D: usize>(aabb: &Aabb<D>, x: &[f64; D]) -> f64 {
     let excess: [f64; D] = std::array::from_fn(|a| (aabb.lower[a] - x[a]).max(x[a] - aabb.upper[a]));
     let nearest = excess.iter().copied().fold(f64::NEG_INFINITY, f64::max);
     if nearest <= 0.0 { nearest } else { norm(excess.iter().map(|e| e.max(0.0))) }

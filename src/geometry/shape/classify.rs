@@ -1,5 +1,6 @@
 //! Position of an axis-aligned box with respect to a shape.
-use super::{Aabb, Frustum, Shape};
+use super::Shape;
+use crate::geometry::{Aabb, Frustum};
 
 /// The side of a shape's surface on which a box lies.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -1,5 +1,6 @@
 //! Whether a solid is thick everywhere.
-use super::{Aabb, Shape, Side};
+use super::{Shape, Side};
+use crate::geometry::Aabb;
 
 /// Most boxes that are tested.
 const MOST: usize = 500_000;

@@ -1,5 +1,6 @@
 //! Whether two shapes share a point.
-use super::{Aabb, Shape, Side};
+use super::{Shape, Side};
+use crate::geometry::Aabb;
 use std::collections::VecDeque;
 
 /// Boxes tested for one pair of shapes.

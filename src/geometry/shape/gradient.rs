@@ -1,6 +1,7 @@
 //! Gradients of signed distances: the outward normals of the surfaces.
-use super::vector::in_space;
-use super::{Aabb, Frustum, Shape};
+use super::Shape;
+use crate::geometry::vector::in_space;
+use crate::geometry::{Aabb, Frustum};
 
 impl<const D: usize> Shape<D> {
     /// Gradient of [`Shape::distance`]: a unit vector out of the shape, at every point of space. Where the
