@@ -1,6 +1,6 @@
 //! Why the program ends without success, and its exit code.
 use agimp::job::JobError;
-use agimp::setup::seed::SeedError;
+use agimp::setup::particles::seed::SeedError;
 
 /// Why the program ends without success.
 #[derive(Debug, thiserror::Error)]

@@ -8,7 +8,7 @@ use std::borrow::Cow;
 
 use partition::Octant;
 
-use super::seed::{SeedError, raster};
+use super::particles::seed::{SeedError, raster};
 use crate::job::problem::{Body, InitialStress, Problem, StressKind};
 use crate::load::water::{Given, Head};
 use crate::load::{Up, Water};

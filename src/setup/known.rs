@@ -7,7 +7,7 @@ use partition::comm::{Comm, World};
 use super::Size;
 use super::estimate::pace::Pace;
 use super::estimate::{Estimate, EstimateError, LevelCount, estimate, tree_memory};
-use super::seed::{SeedError, check_counts};
+use super::particles::seed::{SeedError, check_counts};
 use super::warnings::warnings;
 use crate::job::{AnyProblem, Problem};
 use crate::particle::chunk::Tag;

@@ -4,8 +4,7 @@
 //! |---|---|
 //! | this | the first tree, and the solver on it |
 //! | `constant`, [`stages`] | physics without the changes of stages, and with them |
-//! | `particles`, [`seed`], `lattice` | particles that come with a stage; of one leaf; places of a body's lattice |
-//! | `parts`, `carried` | particles at surfaces of fitted bodies; surfaces under loads |
+//! | [`particles`] | particles that come with a stage; surfaces under loads |
 //! | `materials`, [`walls`], `water` | materials of bodies by stage; colliders that hold fluids; heads of water |
 //! | [`initial_stress`] | stress at the start |
 //! | [`estimate`], [`warnings`], [`known`] | size and duration of a job; likely mistakes in it; both before a run |
@@ -15,24 +14,20 @@ use partition::comm::{Comm, Disagreement};
 use partition::{Forest, MAX_LEVEL, Octant};
 use rayon::prelude::*;
 
-use self::particles::new_particles;
-use self::seed::{SeedError, check_counts, count_leaf};
+use self::particles::seed::{SeedError, check_counts, count_leaf};
+use self::particles::{carried, new_particles};
 use crate::job::Problem;
 use crate::particle::chunk::{Chunk, Tag};
 use crate::solver::balance::rebalance::cut_at;
 use crate::solver::state::cost::leaf_cost;
 use crate::solver::{Clock, Physics, Solver};
 
-mod carried;
 mod constant;
 pub mod estimate;
 pub mod initial_stress;
 pub mod known;
-mod lattice;
 mod materials;
-mod particles;
-mod parts;
-pub mod seed;
+pub mod particles;
 pub mod stages;
 pub mod walls;
 pub mod warnings;

@@ -3,8 +3,9 @@ use partition::comm::{Comm, Disagreement};
 
 use super::constant::constant_physics;
 use super::materials::material_of;
+use super::particles::carried::carry;
 use super::particles::new_particles;
-use super::seed::check_counts;
+use super::particles::seed::check_counts;
 use super::walls;
 use crate::adaptivity::Cohesion;
 use crate::boundary::{ActsOn, Meets};
@@ -160,7 +161,7 @@ pub fn enter_next<const D: usize>(
     added.iter().flat_map(Chunk::tags).for_each(|tag| counts[usize::from(Tag::unpack(*tag).body)] += 1);
     comm.sum_u64(&mut counts);
     comm.agree(check_counts(problem, &counts, stage))?;
-    super::carried::carry(comm, problem, solver, &mut added, stage)?;
+    carry(comm, problem, solver, &mut added, stage)?;
     let is_removed = |body| problem.stages[stage].removed.contains(&body);
     let bodies = 0..problem.bodies.len();
     let is_removed: Vec<bool> = bodies.clone().map(is_removed).collect();

@@ -3,7 +3,7 @@ use partition::comm::{Comm, Disagreement};
 use rayon::prelude::*;
 
 use super::initial_stress::{Which, put_under_stress};
-use super::seed::SeedError;
+use super::particles::seed::SeedError;
 use crate::job::Problem;
 use crate::solver::Solver;
 use crate::text::excerpt;

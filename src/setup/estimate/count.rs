@@ -13,7 +13,7 @@ use super::levels::LevelCount;
 use crate::geometry::{Aabb, Shape, Side};
 use crate::grid::mask::{offset, offset_count};
 use crate::job::problem::{Problem, Region};
-use crate::setup::seed::{SeedError, count_bodies, lattice_count};
+use crate::setup::particles::seed::{SeedError, count_bodies, lattice_count};
 use partition::Octant;
 use std::collections::VecDeque;
 use std::rc::Rc;

@@ -9,7 +9,7 @@
 use self::count::Tally;
 pub use self::levels::LevelCount;
 use self::pace::Pace;
-use super::seed::{SeedError, check_finite};
+use super::particles::seed::{SeedError, check_finite, greatest_speed};
 use crate::job::problem::{Body, Field, MaterialSetup, Problem};
 use crate::particle::Layout;
 use crate::quantity::Quantity;
@@ -200,7 +200,7 @@ const JUMP: f64 = 1.0 / 3.0;
 /// Greatest speed of a body, or difference of the velocities of two where these do not depend on the place,
 /// or speed at which gas moves from a greater pressure to a lesser (in the limit of small differences), m/s.
 fn closing_speed<const D: usize>(problem: &Problem<D>) -> f64 {
-    let greatest = problem.bodies.iter().map(|body| super::seed::greatest_speed(problem, body));
+    let greatest = problem.bodies.iter().map(|body| greatest_speed(problem, body));
     let moves_whole = |body: &&Body<D>| !body.velocity.iter().any(Quantity::depends_on_place);
     let velocity = |body: &Body<D>| body.velocity.each_ref().map(|v| v.at(problem.place(&[0.0; D]), 0.0));
     let all: Vec<[f64; D]> = problem.bodies.iter().filter(moves_whole).map(velocity).collect();
@@ -241,7 +241,7 @@ fn time_step<const D: usize>(problem: &Problem<D>, finest: u8) -> f64 {
         .map(|body| {
             let bounds = body.shape.bounds();
             let reach = if bounds.half_diagonal().is_finite() { bounds.half_diagonal() } else { 0.0 };
-            super::seed::greatest_speed(problem, body) + norm(&body.angular_velocity) * reach
+            greatest_speed(problem, body) + norm(&body.angular_velocity) * reach
         })
         .fold(0.0, f64::max);
     let extent = problem.size();

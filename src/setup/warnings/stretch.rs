@@ -8,7 +8,7 @@ use crate::job::problem::{Body, BoxPolicy};
 use crate::load::{CarriedForce, Kind, Load};
 use crate::material::parameters::Parameters;
 use crate::quantity::Quantity;
-use crate::setup::seed::raster;
+use crate::setup::particles::seed::raster;
 use crate::text::{excerpt, number, quantity};
 
 /// Greatest traction over Young's modulus: beyond, the outermost particles may come off; measured.

@@ -7,7 +7,7 @@ use crate::job::Problem;
 use crate::job::problem::{Body, MaterialSetup};
 use crate::load::{Kind, Load};
 use crate::material::Material;
-use crate::setup::seed::{greatest_speed, raster};
+use crate::setup::particles::seed::{greatest_speed, raster};
 use crate::text::{counted, excerpt, number, quantity};
 
 /// Keys of models that are strengths, Pa.

@@ -1,14 +1,26 @@
 //! Particles that come with a stage.
+//!
+//! | file | what it holds |
+//! |---|---|
+//! | this | the particles of all leaves, numbered and under their stress |
+//! | [`seed`](mod@seed), `lattice` | particles of one leaf; places of a body's lattice |
+//! | `parts` | particles at surfaces of fitted bodies |
+//! | `carried` | columns for loads at the start: surfaces, and shares of point forces |
 use partition::Forest;
 use partition::comm::{Comm, Disagreement};
 use rayon::prelude::*;
 
+use self::seed::{SeedError, check_finite, fill_leaf};
 use super::initial_stress::{Which, put_under_stress};
 use super::materials::material_of;
-use super::seed::{SeedError, check_finite, fill_leaf};
 use crate::job::Problem;
 use crate::particle::chunk::{Chunk, Tag};
 use crate::solver::Physics;
+
+pub(super) mod carried;
+mod lattice;
+mod parts;
+pub mod seed;
 
 /// Collective. The particles that come with the stage of this physics, in the own leaves and under their
 /// stress, numbered from `first` on along the curve, so that no number depends on the partition.

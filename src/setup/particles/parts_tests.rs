@@ -4,7 +4,7 @@ use crate::job::{AnyProblem, parse};
 use crate::particle::chunk::{Chunk, Layout, Tag};
 use crate::particle::volume::reference_volume;
 use crate::setup::estimate::explicit::leaves;
-use crate::setup::seed::fill_leaf;
+use crate::setup::particles::seed::fill_leaf;
 
 fn problem<const D: usize>(domain: &str, tree: &str, bodies: &[&str]) -> Problem<D>
 where

@@ -37,7 +37,7 @@ const STEPS: u32 = 6;
 ///
 /// # Errors
 /// A load finds nothing to act on, and no body comes later that could carry it; the same on all ranks.
-pub(super) fn carry<const D: usize>(
+pub(in crate::setup) fn carry<const D: usize>(
     comm: &Comm,
     problem: &Problem<D>,
     solver: &Solver<D>,

@@ -2,7 +2,7 @@ use super::*;
 use crate::geometry::Shape;
 use crate::job::{AnyProblem, parse};
 use crate::setup::estimate::explicit::leaves;
-use crate::setup::lattice::lattice_of;
+use crate::setup::particles::lattice::lattice_of;
 use proptest::prelude::*;
 
 fn problem<const D: usize>(text: &str) -> Problem<D>
