@@ -3,10 +3,10 @@
 //! A million particles in blocks of their own, so that columns come from memory as in a run; eight
 //! per cell in 3D, four in 2D. Plastic materials flow in every step. Blocks beside level jumps hold some of
 //! their leaf's particles, whose stencils touch constrained nodes.
-use agimp::kernel::booked::Booked;
 use agimp::kernel::constrained_nodes::ConstrainedNodes;
+use agimp::kernel::g2p::booked::Booked;
+use agimp::kernel::g2p::leavers::Leavers;
 use agimp::kernel::hanging::HangingNodes;
-use agimp::kernel::leavers::Leavers;
 use agimp::kernel::{BoxPolicy, Frame, Row, Scheme, Select, Transfer, arena_nodes, g2p, p2g};
 use agimp::material::{Material, Parameters};
 use agimp::particle::chunk::{Chunk, Layout, Place, Tag};

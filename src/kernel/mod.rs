@@ -3,6 +3,16 @@
 //! Knows particles and materials, but no tree, no ranks and no constraints: the caller prepares the arenas
 //! for level jumps. The kernels allocate nothing, and every sum runs over particles in the order of the
 //! selection, so the bits of a result depend on that order alone.
+//!
+//! | file or folder | what it holds |
+//! |---|---|
+//! | this | arenas, their rows, and the settings of transfers |
+//! | [`p2g`] | particles to grid |
+//! | [`g2p`] | grid to particles, and the advance of particles |
+//! | [`stencil`], `weights` | weights along one axis; their products |
+//! | [`domain`], [`spread`] | half widths of boxes; second moments of weights |
+//! | [`hanging`], [`constrained_nodes`] | hanging nodes; nodes with moments |
+//! | `batch`, `select` | batches of particles; which particles take part |
 use bytemuck::{Pod, Zeroable};
 
 use self::batch::Batch;
@@ -12,16 +22,11 @@ use crate::particle::chunk::Tag;
 use crate::simd::{F64x4, LANES, Lanes, Vector};
 
 mod batch;
-pub mod booked;
 pub mod constrained_nodes;
 pub mod domain;
-pub mod fill;
 pub mod g2p;
-mod gathered;
 pub mod hanging;
-pub mod leavers;
 pub mod p2g;
-pub mod rates;
 mod select;
 pub mod spread;
 pub mod stencil;

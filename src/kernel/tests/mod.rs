@@ -1,9 +1,9 @@
 //! Scatter and gather together, against a plain scalar definition.
-use super::booked::Booked;
 use super::constrained_nodes::{ConstrainedNodes, MomentNode};
+use super::g2p::booked::Booked;
+use super::g2p::leavers::Leavers;
 use super::g2p::{Fields, Gathered, Moments};
 use super::hanging::HangingNodes;
-use super::leavers::Leavers;
 use super::p2g::MomentSums;
 use super::*;
 use crate::material::{Material, Parameters};

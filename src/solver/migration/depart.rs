@@ -9,7 +9,7 @@ use super::records::{push_record, record_words};
 use crate::adaptivity::resample::cell_fit::{Resampling, Splits};
 use crate::grid::leaf_geometry::{leaf_box, position_key};
 use crate::grid::{GridPlan, KnownTree};
-use crate::kernel::leavers;
+use crate::kernel::g2p::leavers;
 use crate::material::HISTORIES;
 use crate::material::eigen::determinant;
 use crate::particle::chunk::{Chunk, Layout};

@@ -1,6 +1,6 @@
 //! Numbers that follow the motion of their particle: displacements, areas of loads, total strains, and the ways
 //! and turns over which forces on particles do work.
-use crate::kernel::rates::Rates;
+use crate::kernel::g2p::rates::Rates;
 use crate::load::{Carried, cofactor};
 use crate::particle::chunk::Chunk;
 use crate::particle::strain;

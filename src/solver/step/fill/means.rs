@@ -1,7 +1,7 @@
 //! Mean volume ratio of the fluid in each cell of a leaf.
 use crate::grid::leaf_geometry::LeafCells;
 use crate::kernel::BLOCK;
-use crate::kernel::fill::Flow;
+use crate::kernel::g2p::fill::Flow;
 use crate::material::eigen::determinant;
 use crate::particle::chunk::{Chunk, Layout, TILE, Tag};
 use crate::simd::{Lanes, Vector};

@@ -1,5 +1,5 @@
-//! Fluids keep their volume: how full nodes are, and means over cells; [`crate::kernel::fill`] has the effect
-//! of both on particles.
+//! Fluids keep their volume: how full nodes are, and means over cells; [`crate::kernel::g2p::fill`] has the
+//! effect of both on particles.
 //!
 //! Everything follows from the present state: only the work of the shifts is kept from step to step, for the
 //! history. Sums over nodes are those of masses, means those of one leaf; so jobs with one density need no
@@ -14,7 +14,7 @@ pub(super) mod means;
 mod nodes;
 mod solid;
 
-use crate::kernel::fill::Flow;
+use crate::kernel::g2p::fill::Flow;
 use crate::material::{Material, SHOCK_SUMS};
 use crate::solver::physics::Physics;
 use crate::solver::state::Solver;

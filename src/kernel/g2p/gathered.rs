@@ -1,9 +1,9 @@
-//! Sums that particles gather from the nodes of their stencils; see [`super::g2p`].
-use super::batch::{Batch, lanes_in};
-use super::constrained_nodes::ConstrainedNodes;
-use super::hanging::HangingNodes;
-use super::weights::{NodeWeights, Weights, dot, pencils};
-use super::{ARENA_EDGE, Row};
+//! Sums that particles gather from the nodes of their stencils; see [the gather](super).
+use crate::kernel::batch::{Batch, lanes_in};
+use crate::kernel::constrained_nodes::ConstrainedNodes;
+use crate::kernel::hanging::HangingNodes;
+use crate::kernel::weights::{NodeWeights, Weights, dot, pencils};
+use crate::kernel::{ARENA_EDGE, Row, stencil_span};
 use crate::simd::{F64x4, LANES, Vector};
 
 /// Constrained nodes of an arena, and first moments of those that have them.
@@ -20,8 +20,8 @@ pub struct Moments<'a> {
 pub struct Fields<'a> {
     /// Velocities after the update, `(vx, vy, vz, unused)`; finite also at nodes without mass.
     pub velocity: &'a [Row],
-    /// With [`super::Transfer::Flip`] the changes of velocity in this step; with [`super::Transfer::Xpic`]
-    /// the velocities that particles take on.
+    /// With [`crate::kernel::Transfer::Flip`] the changes of velocity in this step; with
+    /// [`crate::kernel::Transfer::Xpic`] the velocities that particles take on.
     pub increment: Option<&'a [Row]>,
     /// How full nodes are (see [`super::fill`]), with [`FILL_MORE`] values behind the last; where there are
     /// fluids.
@@ -150,7 +150,7 @@ impl<const D: usize> Sums<D> {
         cell: f64,
         fields: &Fields,
     ) {
-        let span = super::stencil_span(D);
+        let span = stencil_span(D);
         for lane in batch.members() {
             let first = weights.first(lane);
             self.contract::<V>(weights, lane, &fields.velocity[first..first + span]);
@@ -203,7 +203,7 @@ impl<const D: usize> Sums<D> {
     /// Fullness, and the gradient of the excess: one value for each node, three nodes along x together.
     #[inline(always)]
     fn contract_fill<V: Vector>(&mut self, weights: &Weights<D>, lane: usize, nodes: &[f64]) {
-        let nodes = &nodes[..super::stencil_span(D) + FILL_MORE];
+        let nodes = &nodes[..stencil_span(D) + FILL_MORE];
         let zero = F64x4::splat(0.0);
         let of = |values: &[f64; LANES]| F64x4::splat(values[lane]);
         let (x, y, z) = (&weights.axis[0], &weights.axis[1], &weights.axis[D - 1]);
@@ -241,7 +241,7 @@ impl<const D: usize> Sums<D> {
         cell: f64,
         velocity: &[Row],
     ) {
-        let span = super::stencil_span(D);
+        let span = stencil_span(D);
         for lane in lanes_in(touched) {
             let first = weights.first(lane);
             let sums = hanging.gather(weights, lane, &velocity[first..first + span]);
@@ -289,7 +289,7 @@ impl<const D: usize> Sums<D> {
 
 /// `Σ w f_j` over the nodes from the first of the stencil on.
 pub(super) fn mean<const D: usize>(weights: &Weights<D>, lane: usize, nodes: &[Row]) -> F64x4 {
-    let nodes = &nodes[..super::stencil_span(D)];
+    let nodes = &nodes[..stencil_span(D)];
     let mut sum = F64x4::splat(0.0);
     weights.for_each_node(lane, |node, weight| sum = weight.mul_add(F64x4::new(nodes[node].0), sum));
     sum

@@ -1,5 +1,5 @@
 //! Particles that leave the box of their leaf, found by G2P while their new positions are in registers.
-use super::batch::Batch;
+use crate::kernel::batch::Batch;
 use crate::particle::Chunk;
 use crate::simd::{LANES, Vector, VectorMask};
 

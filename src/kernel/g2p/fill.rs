@@ -18,9 +18,9 @@
 //!
 //! Shares of a step are those of implicit relaxation, `r_α = y/(1 + y)` with `y = α c Δt / h` and c the speed
 //! of sound. `docs/design/fluid-volume.md` says what each part does, and what else was tried.
-use super::batch::Batch;
 use super::booked::{self, Booked};
 use super::gathered::Sums;
+use crate::kernel::batch::Batch;
 use crate::material::Symmetric;
 use crate::material::eigen::determinant;
 use crate::particle::chunk::Layout;

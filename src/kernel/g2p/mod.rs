@@ -12,20 +12,33 @@
 //! `L_θθ = Σ v_r T` (see [`super::p2g`]). The position is the centre of the box, which moves with the plain mean
 //! of the velocity over the box. So the radius grows at the rate `r L_θθ`: the stretch along the hoop is the
 //! ratio of the radii, whatever the motion.
+//!
+//! | file | what it holds |
+//! |---|---|
+//! | this | the sweep over the particles of a bin, and their advance |
+//! | `gathered` | the sums over nodes |
+//! | [`fill`] | remedies that keep fluids in their volume |
+//! | [`leavers`], [`rates`], [`booked`] | particles that leave; rates of deformation; sums for the history |
+use self::booked::Booked;
+use self::fill::Filling;
+pub use self::gathered::{FILL_MORE, Fields, Gathered, Moments};
+use self::gathered::{Sums, mean};
+use self::leavers::Leavers;
+use self::rates::Rates;
 use super::batch::{Batch, Batches, Tile};
-use super::booked::{self, Booked};
 use super::domain::AtWall;
-use super::fill::Filling;
-pub use super::gathered::{FILL_MORE, Fields, Gathered, Moments};
-use super::gathered::{Sums, mean};
-use super::leavers::Leavers;
-use super::rates::Rates;
 use super::weights::{NodeWeights, Weights};
-use super::{Coordinates, Frame, Row, Scheme, Select, SubBox, Transfer, domain};
+use super::{Coordinates, Frame, Row, Scheme, Select, SubBox, Transfer, domain, symmetric_index};
 use crate::material::eigen::determinant;
 use crate::material::{self, Shock, State, Step};
 use crate::particle::chunk::{Chunk, Layout, Place};
 use crate::simd::{Kernel, LANES, Lanes, Vector, VectorMask, widest};
+
+pub mod booked;
+pub mod fill;
+mod gathered;
+pub mod leavers;
+pub mod rates;
 
 /// Memory reused from bin to bin, as setting it up is slow.
 pub struct Scratch<const D: usize> {
@@ -434,9 +447,9 @@ fn strained<V: Vector, const D: usize>(b: &[V; 6], gradient: &[[V; D]; D], step:
     for i in 0..D {
         let mut ab = [V::splat(0.0); D];
         for j in 0..D {
-            ab[j] = a[i][0] * b[super::symmetric_index::<D>(0, j)];
+            ab[j] = a[i][0] * b[symmetric_index::<D>(0, j)];
             for k in 1..D {
-                ab[j] = a[i][k].mul_add(b[super::symmetric_index::<D>(k, j)], ab[j]);
+                ab[j] = a[i][k].mul_add(b[symmetric_index::<D>(k, j)], ab[j]);
             }
         }
         for j in i..D {
@@ -444,7 +457,7 @@ fn strained<V: Vector, const D: usize>(b: &[V; 6], gradient: &[[V; D]; D], step:
             for k in 1..D {
                 sum = ab[k].mul_add(a[j][k], sum);
             }
-            out[super::symmetric_index::<D>(i, j)] = sum;
+            out[symmetric_index::<D>(i, j)] = sum;
         }
     }
     out
