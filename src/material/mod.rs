@@ -7,51 +7,40 @@
 //! |---|---|
 //! | `state.rs` | the state of a batch of particles, and the step |
 //! | `law.rs` | the trait of a model |
-//! | `advance.rs` `batches.rs` | all of an update; laws as the solver calls them |
+//! | `batches/` | laws as the solver calls them: updates and tangents |
 //! | `solid.rs` | the Hencky solid |
 //! | `consolidation.rs` | the stress that matter has borne |
 //! | `initial.rs` | states under a given stress |
 //! | `laws/` | the models, one file each, and the list of them |
 //! | `parameters/` | parameters that models share: elastic constants, checks, reading from text |
-//! | `angle.rs` | angles of friction and dilation that may soften |
-//! | `coulomb.rs` | return to the Mohr-Coulomb pyramid in principal stresses |
+//! | `strength/` | friction, the Mohr-Coulomb pyramid, hardening; strength over a factor of safety |
 //! | `damage/` | stiffness and strength that are lost for good |
-//! | `eos.rs` | equation of state of metals |
-//! | `hardening/` | strength as a function of plastic strain, rate and temperature |
-//! | `shock.rs` | artificial viscosity |
+//! | `shock/` | artificial viscosity; equation of state of metals |
 //! | `root.rs` | roots of scalar equations, lane by lane |
-//! | `strength.rs` | strength over a factor of safety |
-//! | `tangent.rs` | derivatives of the stress by the deformation |
 //! | `tensor/` | symmetric tensors of batches: eigenvalues, logarithm, exponential |
 //! | `undrained.rs` | water that cannot leave the pores of a solid |
 //! | `driver/` | one particle along a path |
 use crate::simd::{LANES, Mask, VectorMask};
 
-mod advance;
-mod angle;
 mod batches;
 mod consolidation;
-mod coulomb;
 pub mod damage;
 pub mod driver;
-pub mod eos;
-mod hardening;
 pub mod initial;
 mod law;
 pub mod laws;
 pub mod parameters;
 mod root;
-mod shock;
+pub mod shock;
 mod solid;
 mod state;
 mod strength;
-mod tangent;
 pub(crate) mod tensor;
 #[cfg(test)]
 mod tests;
 pub mod undrained;
 
-pub use batches::Material;
+pub use batches::{Material, Tangent};
 pub use consolidation::Consolidation;
 pub use law::Law;
 pub use laws::Model;
@@ -60,7 +49,6 @@ pub use shock::{SHOCK_SUMS, Shock, Viscosity};
 use state::OWN;
 pub use state::{HISTORIES, PLASTIC_STRAIN, PLASTIC_VOLUME, State, Step};
 pub use strength::Weakened;
-pub use tangent::Tangent;
 pub use tensor::eigen::{self, Symmetric};
 
 /// Fate of a particle whose material has failed.

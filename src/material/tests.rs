@@ -1,7 +1,7 @@
 //! Properties that every model of the list has.
 use proptest::prelude::*;
 
-use super::advance::advance;
+use super::batches::advance::advance;
 use super::laws::{Visitor, for_each_law};
 use super::*;
 use crate::simd::{Lanes, Vector};

@@ -11,10 +11,10 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::material::hardening::Hardening;
 use crate::material::laws::metal::{Part, VonMises};
 use crate::material::parameters::OutOfRange;
 use crate::material::solid::Hencky;
+use crate::material::strength::hardening::Hardening;
 use crate::material::tensor::strain::Strain;
 use crate::material::{HISTORIES, Law, OWN, PLASTIC_STRAIN, State, Step};
 use crate::simd::math::{exp, ln};

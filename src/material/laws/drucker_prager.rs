@@ -14,12 +14,13 @@ use serde::{Deserialize, Serialize};
 
 use super::Model;
 use super::metal::Overstress;
-use crate::material::hardening::{Curve, Flow, Hardening};
 use crate::material::parameters::{Lame, OutOfRange};
 use crate::material::root::Function;
 use crate::material::solid::Hencky;
+use crate::material::strength::angle;
+use crate::material::strength::hardening::{Curve, Flow, Hardening};
 use crate::material::tensor::strain::Strain;
-use crate::material::{HISTORIES, Law, OWN, PLASTIC_STRAIN, PLASTIC_VOLUME, State, Step, angle, root};
+use crate::material::{HISTORIES, Law, OWN, PLASTIC_STRAIN, PLASTIC_VOLUME, State, Step, root};
 use crate::simd::{Vector, VectorMask};
 
 /// The cone through the Mohr-Coulomb pyramid on which a friction angle is matched.

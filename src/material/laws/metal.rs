@@ -1,7 +1,7 @@
 //! The law of a metal with von Mises yield; its formulas are in `von_mises.rs`.
-use crate::material::hardening::{Curve, Flow};
 use crate::material::root::Function;
 use crate::material::solid::Hencky;
+use crate::material::strength::hardening::{Curve, Flow};
 use crate::material::tensor::strain::Strain;
 use crate::material::{HISTORIES, Law, OWN, PLASTIC_STRAIN, State, Step, root};
 use crate::simd::math::{exp, ln};

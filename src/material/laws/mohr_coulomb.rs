@@ -2,8 +2,8 @@
 //! `τ₁ ≥ τ₂ ≥ τ₃`: `f = (τ₁ - τ₃) + (τ₁ + τ₃) sin φ - 2c cos φ`.
 //!
 //! Flow is along the same with the dilation angle ψ in place of φ, exact on edges and at the apex
-//! (`coulomb.rs`). With `flow = "radial"` the deviator shrinks instead and the mean stays: isochoric, as
-//! Drucker-Prager's.
+//! (`strength/coulomb.rs`). With `flow = "radial"` the deviator shrinks instead and the mean stays: isochoric,
+//! as Drucker-Prager's.
 //!
 //! Cohesion hardens or softens with `κ = √(2/3) |dev ε_p|`; angles may soften with it. Where the material
 //! opens (apex, cut-off), the volume that it gains is stored, and given back on compression (Tampubolon et
@@ -12,12 +12,12 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::Model;
-use crate::material::angle::{self, Angle};
-use crate::material::coulomb::{Pyramid, Returned, Slopes};
-use crate::material::hardening::{Curve, Flow, Hardening};
 use crate::material::parameters::{Lame, OutOfRange};
 use crate::material::root::Function;
 use crate::material::solid::Hencky;
+use crate::material::strength::angle::{self, Angle};
+use crate::material::strength::coulomb::{Pyramid, Returned, Slopes};
+use crate::material::strength::hardening::{Curve, Flow, Hardening};
 use crate::material::tensor::principal::{Lone, Principal};
 use crate::material::tensor::strain::{Strain, finish};
 use crate::material::{HISTORIES, Law, OWN, PLASTIC_STRAIN, PLASTIC_VOLUME, State, Step, root};

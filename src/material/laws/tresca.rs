@@ -5,9 +5,9 @@ use serde::{Deserialize, Serialize};
 
 use super::Model;
 use super::mohr_coulomb::{MohrCoulomb, Properties};
-use crate::material::hardening::{Curve, Hardening};
 use crate::material::parameters::OutOfRange;
 use crate::material::solid::Hencky;
+use crate::material::strength::hardening::{Curve, Hardening};
 use crate::material::{HISTORIES, Law, State, Step};
 use crate::simd::Vector;
 

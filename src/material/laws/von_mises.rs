@@ -11,10 +11,10 @@ use serde::{Deserialize, Serialize};
 use super::Model;
 use super::metal::{Overstress, VonMises};
 use crate::material::damage::{Ductile, Failure};
-use crate::material::eos::{Eos, Shocked};
-use crate::material::hardening::{Curve, Hardening};
 use crate::material::parameters::OutOfRange;
+use crate::material::shock::eos::{Eos, Shocked};
 use crate::material::solid::Hencky;
+use crate::material::strength::hardening::{Curve, Hardening};
 
 /// Hencky elasticity with von Mises yield, isotropic hardening and viscous overstress.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]

@@ -182,7 +182,7 @@ impl Law for Gas {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::material::advance::advance;
+    use crate::material::batches::advance::advance;
     use crate::material::driver::Point;
     use crate::material::{Shock, Viscosity};
     use crate::simd::{LANES, Lanes};

@@ -11,8 +11,8 @@
 //!
 //! for k ≠ m: the divided differences of Daleckii and Krein (1965); of equal values they are the derivatives
 //! `(A_kk - A_km - A_mk + A_mm)/2`. A comes from the law itself, with numbers that carry derivatives ([`Dual`]).
-use super::tensor::eigen::{Symmetric, decompose};
-use super::{Law, State, Step};
+use crate::material::tensor::eigen::{Symmetric, decompose};
+use crate::material::{Law, State, Step};
 use crate::simd::math::{exp, ln};
 use crate::simd::{Dual, Lanes, Mask, Vector, VectorMask};
 
@@ -79,7 +79,7 @@ fn apart(strain: [Lanes; 3]) -> [Lanes; 3] {
 
 impl Tangent {
     /// With a stress beside that is a function of the volume, with this derivative by its logarithm, Pa.
-    pub(super) fn with_bulk(mut self, bulk: Lanes) -> Self {
+    pub(in crate::material) fn with_bulk(mut self, bulk: Lanes) -> Self {
         for entry in self.normal.iter_mut().flatten() {
             *entry += bulk;
         }
@@ -102,7 +102,7 @@ impl Tangent {
     }
 
     /// That of `other` in the lanes of a mask, and this one in the others.
-    pub(super) fn with_lanes(mut self, mask: Mask, other: &Self) -> Self {
+    pub(in crate::material) fn with_lanes(mut self, mask: Mask, other: &Self) -> Self {
         let all = |tangent: &mut Self, from: &Self| {
             let own = tangent.directions.iter_mut().chain(&mut tangent.normal).flatten();
             let own = own.chain(&mut tangent.shear);

@@ -1,6 +1,6 @@
 //! Strength over a factor of safety, which grows during a run.
-use super::undrained::{self, Undrained};
-use super::{Material, Parameters};
+use crate::material::undrained::{self, Undrained};
+use crate::material::{Material, Parameters};
 
 /// A material whose strength is divided by a factor.
 #[derive(Clone, Debug)]

@@ -16,12 +16,12 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::hardening::Hardening;
-use super::laws::metal::{VonMises, Whole};
-use super::parameters::OutOfRange;
-use super::tensor::eigen::determinant;
-use super::tensor::strain::Strain;
-use super::{HISTORIES, Law, OWN, PLASTIC_VOLUME, State, Step};
+use crate::material::laws::metal::{VonMises, Whole};
+use crate::material::parameters::OutOfRange;
+use crate::material::strength::hardening::Hardening;
+use crate::material::tensor::eigen::determinant;
+use crate::material::tensor::strain::Strain;
+use crate::material::{HISTORIES, Law, OWN, PLASTIC_VOLUME, State, Step};
 use crate::simd::math::{exp, ln};
 use crate::simd::{Vector, VectorMask};
 
@@ -67,7 +67,7 @@ pub enum Eos {
 
 impl Eos {
     /// Checks that a metal may have it.
-    pub(super) fn check(self, has_damage: bool) -> Result<(), OutOfRange> {
+    pub(in crate::material) fn check(self, has_damage: bool) -> Result<(), OutOfRange> {
         let Self::MieGruneisen { sound_speed, .. } = self;
         if !has_damage {
             return Ok(());
@@ -79,7 +79,7 @@ impl Eos {
 
 /// Von Mises solid with an equation of state.
 #[derive(Clone, Debug)]
-pub(super) struct Shocked {
+pub(in crate::material) struct Shocked {
     metal: VonMises,
     /// `ρ_0 c_0²`, Pa.
     bulk: f64,
@@ -105,7 +105,7 @@ struct Volume<V> {
 }
 
 impl Shocked {
-    pub(super) fn new(metal: VonMises, eos: &Eos, hardening: &Hardening) -> Self {
+    pub(in crate::material) fn new(metal: VonMises, eos: &Eos, hardening: &Hardening) -> Self {
         let Eos::MieGruneisen { sound_speed, slope, gruneisen, tension_limit } = *eos;
         let heated = hardening.homologous().map_or(1.0, |(_, fraction)| fraction);
         let kelvin = if heated > 0.0 { metal.warming() / heated } else { 0.0 };

@@ -1,11 +1,11 @@
 //! All of an update: that of the law, and artificial viscosity.
-use super::shock::{Shock, Viscosity};
-use super::{Law, State, Step};
+use crate::material::shock::{Shock, Viscosity};
+use crate::material::{Law, State, Step};
 use crate::simd::{Vector, VectorMask};
 
 /// [`Law::respond`] and artificial viscosity.
 #[inline(always)]
-pub(super) fn advance<V: Vector>(law: &impl Law, state: &mut State<V>, step: &Step) {
+pub(in crate::material) fn advance<V: Vector>(law: &impl Law, state: &mut State<V>, step: &Step) {
     law.respond(state, step);
     if let Some(shock) = &step.shock {
         press(shock, law, state, step);

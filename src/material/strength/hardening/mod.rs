@@ -19,11 +19,11 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::parameters::OutOfRange;
+use crate::material::parameters::OutOfRange;
 
 mod curve;
 
-pub(super) use curve::{Curve, Flow};
+pub(in crate::material) use curve::{Curve, Flow};
 
 /// How strength changes with plastic strain: a number is the modulus of linear hardening, Pa.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -181,7 +181,7 @@ fn most() -> f64 {
 impl Hardening {
     /// Checks conditions beyond the ranges of single keys. `initial` is the strength of the undeformed
     /// material, Pa.
-    pub(super) fn check(&self, initial: f64) -> Result<(), OutOfRange> {
+    pub(in crate::material) fn check(&self, initial: f64) -> Result<(), OutOfRange> {
         let fail = |key: &str, value: f64, range: String| {
             Err(OutOfRange { key: format!("hardening.{key}"), value, range })
         };
@@ -228,7 +228,7 @@ impl Hardening {
 
     /// As [`Hardening::check`] for cohesion (Pa) of a model with these angles of friction and dilation,
     /// degrees.
-    pub(super) fn check_frictional(
+    pub(in crate::material) fn check_frictional(
         &self,
         cohesion: f64,
         [friction, dilation]: [f64; 2],
@@ -248,7 +248,7 @@ impl Hardening {
     }
 
     /// The same curve with all strengths over `factor`.
-    pub(super) fn weakened(&self, factor: f64) -> Self {
+    pub(in crate::material) fn weakened(&self, factor: f64) -> Self {
         let mut law = match self {
             Self::Modulus(modulus) => return Self::Modulus(modulus / factor),
             Self::Law(law) => law.clone(),
@@ -271,7 +271,7 @@ impl Hardening {
 
     /// Homologous temperature of the undeformed material, and the part of the plastic work that becomes heat,
     /// of laws with temperatures.
-    pub(super) fn homologous(&self) -> Option<(f64, f64)> {
+    pub(in crate::material) fn homologous(&self) -> Option<(f64, f64)> {
         let Self::Law(HardeningLaw::JohnsonCook {
             reference_temperature: reference,
             melting_temperature: melting,
@@ -286,7 +286,7 @@ impl Hardening {
     }
 
     /// Whether it needs the history variable of the temperature.
-    pub(super) fn heats(&self) -> bool {
+    pub(in crate::material) fn heats(&self) -> bool {
         matches!(self, Self::Law(HardeningLaw::JohnsonCook { .. }))
     }
 }

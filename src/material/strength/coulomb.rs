@@ -6,12 +6,12 @@
 //! problem over the faces that sorted stresses can reach (the one between 1 and 3 and its two neighbours, and
 //! three of the cut-off); its solution is found by going from faces to edges to the apex, as in de Souza
 //! Neto, Perić and Owen (2008), section 8.2.
-use super::parameters::Lame;
+use crate::material::parameters::Lame;
 use crate::simd::{Vector, VectorMask};
 
 /// A pyramid, for each particle.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Pyramid<V> {
+pub(in crate::material) struct Pyramid<V> {
     /// sin φ.
     pub friction: V,
     /// sin ψ.
@@ -24,7 +24,7 @@ pub(super) struct Pyramid<V> {
 
 /// Returned principal stresses.
 #[derive(Clone, Copy)]
-pub(super) struct Returned<V: Vector> {
+pub(in crate::material) struct Returned<V: Vector> {
     /// Greatest first, Pa.
     pub stress: [V; 3],
     /// Where the trial stress lies outside the pyramid.
@@ -36,7 +36,7 @@ pub(super) struct Returned<V: Vector> {
 /// Coefficients of the return map, from a pyramid and the elastic constants. Pyramids that do not change have
 /// them computed once.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Slopes<V> {
+pub(in crate::material) struct Slopes<V> {
     /// Stress per flow on the face between 1 and 3, along 1, 2 and 3, Pa.
     stress: [V; 3],
     /// Flow per excess of f on this face, 1/Pa.
@@ -53,7 +53,7 @@ pub(super) struct Slopes<V> {
 impl<V: Copy> Pyramid<V> {
     /// With other numbers.
     #[inline(always)]
-    pub(super) fn map<W>(&self, change: impl Fn(V) -> W) -> Pyramid<W> {
+    pub(in crate::material) fn map<W>(&self, change: impl Fn(V) -> W) -> Pyramid<W> {
         Pyramid {
             friction: change(self.friction),
             dilation: change(self.dilation),
@@ -66,7 +66,7 @@ impl<V: Copy> Pyramid<V> {
 impl<V: Copy> Slopes<V> {
     /// With other numbers.
     #[inline(always)]
-    pub(super) fn map<W>(&self, change: impl Fn(V) -> W) -> Slopes<W> {
+    pub(in crate::material) fn map<W>(&self, change: impl Fn(V) -> W) -> Slopes<W> {
         let [first, second, third] = self.stress;
         Slopes {
             stress: [change(first), change(second), change(third)],
@@ -81,7 +81,7 @@ impl<V: Copy> Slopes<V> {
 impl<V: Vector> Pyramid<V> {
     /// The coefficients of the return map.
     #[inline(always)]
-    pub(super) fn slopes(&self, elastic: &Lame) -> Slopes<V> {
+    pub(in crate::material) fn slopes(&self, elastic: &Lame) -> Slopes<V> {
         let (zero, one) = (V::splat(0.0), V::splat(1.0));
         let (friction, dilation) = (self.friction, self.dilation);
         let (twice_mu, lambda) = (2.0 * elastic.mu, elastic.lambda);
@@ -107,7 +107,7 @@ impl<V: Vector> Pyramid<V> {
     /// Whether a stress with this mean and this norm of the deviator lies inside whatever its Lode angle, or
     /// outside whatever its Lode angle. Where it is neither, [`Pyramid::holds`] decides.
     #[inline(always)]
-    pub(super) fn surely(&self, mean: V, norm: V, slopes: &Slopes<V>) -> [V::Mask; 2] {
+    pub(in crate::material) fn surely(&self, mean: V, norm: V, slopes: &Slopes<V>) -> [V::Mask; 2] {
         // √(3/2) |dev| <= s₁ - s₃ <= √2 |dev|; no principal stress is further from the mean than √(2/3)
         // |dev|, and the sum of the greatest and the least from twice the mean by √(1/6) |dev|.
         let far = norm * (2.0_f64 / 3.0).sqrt();
@@ -121,7 +121,7 @@ impl<V: Vector> Pyramid<V> {
 
     /// Whether a stress, greatest first, lies inside although each value may be wrong by `slack`.
     #[inline(always)]
-    pub(super) fn holds(&self, stress: &[V; 3], slack: V) -> V::Mask {
+    pub(in crate::material) fn holds(&self, stress: &[V; 3], slack: V) -> V::Mask {
         let [high, _, low] = *stress;
         let (high, low) = (high + slack, low - slack);
         let face = (high - low) + (high + low + slack + slack).mul_add(self.friction, -self.strength);
@@ -136,7 +136,12 @@ impl<V: Vector> Pyramid<V> {
 
     /// The returned stress of a trial stress, greatest first.
     #[inline(always)]
-    pub(super) fn returned(&self, trial: &[V; 3], slopes: &Slopes<V>, elastic: &Lame) -> Returned<V> {
+    pub(in crate::material) fn returned(
+        &self,
+        trial: &[V; 3],
+        slopes: &Slopes<V>,
+        elastic: &Lame,
+    ) -> Returned<V> {
         let [s1, s2, s3] = *trial;
         let [d1, bulk, d3] = slopes.stress;
         let excess = self.face(s1, s3);

@@ -1,9 +1,18 @@
 //! Laws as the solver calls them: once for each batch of particles.
-use super::advance::advance;
+//!
+//! | file | content |
+//! |---|---|
+//! | `mod.rs` | the trait of materials, for any law |
+//! | `advance.rs` | all of an update |
+//! | `tangent.rs` | derivatives of the stress by the deformation |
+use self::advance::advance;
+pub use self::tangent::Tangent;
 use super::consolidation::Consolidation;
-use super::tangent::{self, Tangent};
 use super::{HISTORIES, Law, PLASTIC_STRAIN, State, Step};
 use crate::simd::{Kernel, Lanes, Vector, widest};
+
+pub(super) mod advance;
+mod tangent;
 
 /// A constitutive model with its parameters, called once for each batch of particles.
 pub trait Material: std::fmt::Debug + Send + Sync {

@@ -2,7 +2,7 @@
 use crate::simd::Vector;
 
 /// The angle (degrees) whose tangent is that of another over `factor`.
-pub(super) fn weakened(degrees: f64, factor: f64) -> f64 {
+pub(in crate::material) fn weakened(degrees: f64, factor: f64) -> f64 {
     if factor == 1.0 {
         return degrees;
     }
@@ -11,7 +11,7 @@ pub(super) fn weakened(degrees: f64, factor: f64) -> f64 {
 
 /// Share of cohesion and `tan φ` that material with associated flow needs to be as strong as one with
 /// friction angle φ and dilation angle ψ, in degrees: `cos ψ cos φ / (1 - sin ψ sin φ)` (Davis 1968).
-pub(super) fn davis(friction: f64, dilation: f64) -> f64 {
+pub(in crate::material) fn davis(friction: f64, dilation: f64) -> f64 {
     if friction == dilation {
         return 1.0;
     }
@@ -21,7 +21,7 @@ pub(super) fn davis(friction: f64, dilation: f64) -> f64 {
 
 /// An angle that may soften.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Angle {
+pub(in crate::material) struct Angle {
     /// Sine and cosine at the start.
     pub sine: f64,
     pub cosine: f64,
@@ -31,19 +31,19 @@ pub(super) struct Angle {
 
 impl Angle {
     /// From degrees at the start and at the end.
-    pub(super) fn new(first: f64, last: f64) -> Self {
+    pub(in crate::material) fn new(first: f64, last: f64) -> Self {
         let angle = first.to_radians();
         Self { sine: libm::sin(angle), cosine: libm::cos(angle), softens: (first - last).to_radians() }
     }
 
     /// Whether it is zero from the start to the residual state.
-    pub(super) fn is_zero(self) -> bool {
+    pub(in crate::material) fn is_zero(self) -> bool {
         self.sine == 0.0 && self.softens == 0.0
     }
 
     /// Sine and cosine once a share `lost`, from 0 to 1, of the possible decrease has occurred.
     #[inline(always)]
-    pub(super) fn softened<V: Vector>(self, lost: V) -> [V; 2] {
+    pub(in crate::material) fn softened<V: Vector>(self, lost: V) -> [V; 2] {
         let (sine, cosine) = (V::splat(self.sine), V::splat(self.cosine));
         if self.softens == 0.0 {
             return [sine, cosine];
