@@ -8,8 +8,8 @@ use crate::boundary::Collider as Solid;
 use crate::geometry::written::Shape;
 use crate::job::parse::source::Path;
 use crate::job::problem::{CollapseLaw, Coordinates, Field};
-use crate::job::schema::colliders::{Collider, Motion, MotionRecord, Row};
 use crate::job::schema::common::{AxisName, Spin};
+use crate::job::schema::conditions::colliders::{Collider, Motion, MotionRecord, Row};
 use crate::job::schema::job_file::{self as file, Boundaries, Face, Geometry, JobFile, Quantity};
 use crate::job::schema::probes::FaceName;
 

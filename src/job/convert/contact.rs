@@ -5,7 +5,7 @@ use super::checks::Checks;
 use crate::boundary::BodyContacts;
 use crate::boundary::bodies::{Pair, PairLaw};
 use crate::job::parse::source::Path;
-use crate::job::schema::contact::{BodyContact, PairKind, Side};
+use crate::job::schema::conditions::contact::{BodyContact, PairKind, Side};
 use crate::job::schema::job_file::JobFile;
 
 /// Most velocity fields of a job.

@@ -3,8 +3,8 @@ use super::checks::{Checks, Space};
 use super::quantities::{at_nodes, quantity, vector};
 use crate::geometry::written::Vector;
 use crate::job::parse::source::Path;
+use crate::job::schema::conditions::loads::{Load as Written, LoadKind, Sharing};
 use crate::job::schema::job_file::JobFile;
-use crate::job::schema::loads::{Load as Written, LoadKind, Sharing};
 use crate::load::{Carried, CarriedForce, Gravity, Kind, Load};
 use crate::quantity::Quantity;
 use crate::text::written as number;
@@ -149,7 +149,7 @@ fn direction<const D: usize>(
 /// Gravity is the same everywhere.
 pub(super) fn gravity<const D: usize>(
     checks: &mut Checks,
-    written: &[crate::job::schema::loads::Quantity],
+    written: &[crate::job::schema::conditions::loads::Quantity],
     path: &Path,
 ) -> Option<Gravity<D>> {
     let components = vector::<D>(checks, written, path)?;

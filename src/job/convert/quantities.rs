@@ -7,7 +7,7 @@ use crate::geometry::mesh::HeightRaster;
 use crate::geometry::written::Vector;
 use crate::job::parse::error::QUOTED;
 use crate::job::parse::source::Path;
-use crate::job::schema::loads::{
+use crate::job::schema::conditions::loads::{
     Column as WrittenColumn, Points, Quantity as WrittenQuantity, Raster, Record,
 };
 use crate::quantity::record::{self, Column};

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 pub(in crate::job) const FASTEST: f64 = 1e8;
 
 /// For vectors that are velocities.
-pub(super) fn velocity(schema: &mut schemars::Schema) {
+pub(in crate::job::schema) fn velocity(schema: &mut schemars::Schema) {
     bound_items(schema, FASTEST);
 }
 
@@ -35,15 +35,15 @@ pub enum AxisName {
 }
 
 /// Whether a flag is off.
-pub(super) fn is_off(flag: &bool) -> bool {
+pub(in crate::job::schema) fn is_off(flag: &bool) -> bool {
     !*flag
 }
 
 /// Default of flags that are on.
-pub(super) fn yes() -> bool {
+pub(in crate::job::schema) fn yes() -> bool {
     true
 }
 
-pub(super) fn two() -> f64 {
+pub(in crate::job::schema) fn two() -> f64 {
     2.0
 }

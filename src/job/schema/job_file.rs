@@ -2,19 +2,19 @@
 //!
 //! The comments here are the descriptions in the schema and in error messages, so each says its unit.
 pub use super::adaptivity::Adaptivity;
-pub use super::boundaries::{Boundaries, Face, Leaving};
-pub use super::colliders::Collider;
 pub use super::common::{AxisName, Spin};
 use super::common::{two, yes};
-pub use super::contact::BodyContact;
+pub use super::conditions::boundaries::{Boundaries, Face, Leaving};
+pub use super::conditions::colliders::Collider;
+pub use super::conditions::contact::BodyContact;
+pub use super::conditions::loads::{Load, Quantity};
+pub use super::conditions::sources::Source;
+pub use super::conditions::stress::Stress;
+pub use super::conditions::water::Water;
 pub use super::equilibrium::Equilibrium;
-pub use super::loads::{Load, Quantity};
 pub use super::output::{Checkpoint, History, Output, Report, Telemetry};
 pub use super::probes::{Flux, Line, Map, Probe, Track};
-pub use super::sources::Source;
 pub use super::stages::Stage;
-pub use super::stress::Stress;
-pub use super::water::Water;
 use crate::geometry::written::Shape;
 pub use crate::geometry::written::Vector;
 use crate::material::parameters::Parameters;

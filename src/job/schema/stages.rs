@@ -1,7 +1,7 @@
 //! Stages of a run as they are written in a job file.
-use super::boundaries::Boundaries;
+use super::conditions::boundaries::Boundaries;
+use super::conditions::loads::Quantity;
 use super::equilibrium::Equilibrium;
-use super::loads::Quantity;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

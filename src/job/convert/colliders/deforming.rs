@@ -5,7 +5,7 @@ use crate::geometry::mesh::{Deforming, Mismatch};
 use crate::geometry::written::Shape as Written;
 use crate::job::parse::error::QUOTED;
 use crate::job::parse::source::Path;
-use crate::job::schema::colliders::Frames;
+use crate::job::schema::conditions::colliders::Frames;
 use crate::text::excerpt;
 
 /// The surface through the mesh of the collider's shape and those of its frames.

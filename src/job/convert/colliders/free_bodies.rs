@@ -9,8 +9,8 @@ use crate::boundary::rigid::{Meeting, turning};
 use crate::boundary::vector::length;
 use crate::geometry::{Moments, Shape};
 use crate::job::parse::source::Path;
-use crate::job::schema::colliders::{Inertia, Motion as Written};
 use crate::job::schema::common::Spin;
+use crate::job::schema::conditions::colliders::{Inertia, Motion as Written};
 use crate::text::written;
 
 /// A free body, its axis, and the reference point if that follows from the shape.

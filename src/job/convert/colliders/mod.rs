@@ -18,8 +18,10 @@ use crate::boundary::motion::{Motion, Rate, Table};
 use crate::boundary::{ActsOn, Collider, Contact};
 use crate::geometry::{Aabb, Shape, common_point};
 use crate::job::parse::source::Path;
-use crate::job::schema::colliders::{ActsOn as WrittenActsOn, Contact as WrittenContact, Motion as Written};
 use crate::job::schema::common::Spin;
+use crate::job::schema::conditions::colliders::{
+    ActsOn as WrittenActsOn, Contact as WrittenContact, Motion as Written,
+};
 use crate::job::schema::job_file as file;
 
 /// Most colliders of a job: the header of a checkpoint has limited room.

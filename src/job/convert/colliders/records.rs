@@ -5,7 +5,7 @@ use super::keys::optional;
 use crate::boundary::motion::{Knot, Table};
 use crate::checksum::fnv1a;
 use crate::job::parse::source::Path;
-use crate::job::schema::colliders::{MotionRecord, Row};
+use crate::job::schema::conditions::colliders::{MotionRecord, Row};
 use crate::quantity::record;
 use crate::text::{counted, written};
 

@@ -1,7 +1,7 @@
 //! Colliders as they are written in a job file.
-use super::common::{AxisName, Spin, is_off, velocity};
 use super::loads::{Column, first, one};
 use crate::geometry::written::{Shape, Vector};
+use crate::job::schema::common::{AxisName, Spin, is_off, velocity};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

@@ -1,6 +1,6 @@
 //! Sources as they are written in a job file.
-use super::common::two;
 use crate::geometry::written::{Shape, Vector};
+use crate::job::schema::common::two;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

@@ -1,7 +1,7 @@
 //! Stress at the start of a body, as it is written in a job file.
-use super::common::is_off;
 use super::loads::Quantity;
 use crate::geometry::written::bound_items;
+use crate::job::schema::common::is_off;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

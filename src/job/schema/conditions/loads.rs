@@ -1,6 +1,6 @@
 //! Loads and quantities as they are written in a job file.
-use super::common::yes;
 use crate::geometry::written::{Shape, Vector};
+use crate::job::schema::common::yes;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

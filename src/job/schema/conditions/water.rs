@@ -1,7 +1,7 @@
 //! Water in the pores as it is written in a job file.
 use super::loads::Quantity;
-use super::probes::FaceName;
 use crate::geometry::written::Shape;
+use crate::job::schema::probes::FaceName;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
