@@ -2,9 +2,10 @@
 use rustc_hash::FxHashMap;
 
 use super::checks::{Checks, Space, check_names};
+use super::conditions::stress;
 use super::materials::material_setup;
 use super::settings::is_symmetric;
-use super::{stages, stress};
+use super::stages;
 use crate::geometry::written::Shape as Written;
 use crate::geometry::{Aabb, Sampling, Shape};
 use crate::job::parse::error::QUOTED;

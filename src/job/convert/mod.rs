@@ -1,31 +1,27 @@
 //! From the file's types to a checked problem: conditions beyond the schema on domain, tree, materials and
 //! bodies.
 //!
-//! | file | subject |
+//! | file or folder | subject |
 //! |---|---|
 //! | `materials` | materials, and what becomes of failed particles |
 //! | `bodies` | bodies |
 //! | `checks` | state that all share: faults with their places, the domain |
 //! | `quasi_static` | load steps, and what jobs with them cannot have |
 //! | `settings` | faces, numerics, output, report |
-//! | `shapes` | shapes, among them terrain, and particles from a file |
+//! | `shapes/` | shapes, among them terrain, and particles from a file |
+//! | `conditions/` | what acts on the material: loads, colliders, contact, sources, stress, water |
 //! | `adaptivity` | dynamic refinement |
 //! | `axisymmetry` | what axisymmetric jobs cannot have |
-//! | `colliders` | colliders and their motion |
-//! | `contact` | contact between bodies |
-//! | `loads` | loads and quantities |
 //! | `probes` | probes, tracks, fluxes, lines and maps |
-//! | `sources` | sources |
 //! | `stages` | stages of the run |
-//! | `stress` | stress of bodies at the start |
 //! | `overlap` | whether bodies overlap |
-//! | `water` | water in the pores |
 use self::adaptivity::{Context, adaptivity};
 use self::bodies::bodies;
 use self::checks::{Checks, Space};
-use self::colliders::colliders;
-use self::contact::body_contacts;
-use self::loads::{gravity, loads};
+use self::conditions::colliders::colliders;
+use self::conditions::contact::body_contacts;
+use self::conditions::loads::{gravity, loads};
+use self::conditions::{sources, water};
 use self::materials::materials;
 use self::settings::{digest, faces, numerics, output, report};
 use super::parse::error::{Fault, Position, QUOTED};
@@ -45,20 +41,14 @@ mod adaptivity;
 mod axisymmetry;
 mod bodies;
 mod checks;
-mod colliders;
-mod contact;
-mod loads;
+mod conditions;
 mod materials;
 mod overlap;
 mod probes;
-mod quantities;
 mod quasi_static;
 pub(super) mod settings;
 mod shapes;
-mod sources;
 mod stages;
-mod stress;
-mod water;
 
 /// Most leaves that a uniform tree of the base level may have.
 const MAX_BASE_LEAVES: f64 = 4_294_967_296.0;

@@ -1,6 +1,6 @@
 //! From the file's types to a checked problem: faces, numerics, output and report.
 use super::checks::{Checks, Space};
-use super::quantities::at_nodes;
+use super::conditions::quantities::at_nodes;
 use crate::boundary::Absorbing;
 use crate::boundary::absorbing::AbsorbingFaces;
 use crate::checksum::fnv1a;

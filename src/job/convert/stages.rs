@@ -1,6 +1,7 @@
 //! Stages of the run.
 use super::checks::Checks;
-use super::{loads, settings};
+use super::conditions::loads;
+use super::settings;
 use crate::job::parse::error::QUOTED;
 use crate::job::parse::source::Path;
 use crate::job::problem::{FactorSearch, InStages, Stage};

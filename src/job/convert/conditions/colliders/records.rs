@@ -1,9 +1,9 @@
 //! Tables of motion: rows of the job, or of a file.
-use super::super::checks::Checks;
-use super::super::quantities::column;
 use super::keys::optional;
 use crate::boundary::motion::{Knot, Table};
 use crate::checksum::fnv1a;
+use crate::job::convert::checks::Checks;
+use crate::job::convert::conditions::quantities::column;
 use crate::job::parse::source::Path;
 use crate::job::schema::conditions::colliders::{MotionRecord, Row};
 use crate::quantity::record;

@@ -1,6 +1,6 @@
 //! Initial fields of bodies: velocities and stresses.
-use super::checks::Checks;
 use super::quantities::{quantity, vector};
+use crate::job::convert::checks::Checks;
 use crate::job::parse::source::Path;
 use crate::job::problem::{InitialStress, StressKind};
 use crate::job::schema::conditions::loads::Quantity as Written;
@@ -12,7 +12,7 @@ use crate::quantity::Quantity;
 use crate::text::written as number;
 
 /// Components that may depend on the place and not on time, numbers at most `greatest` in size; or faults.
-pub(super) fn fields<const D: usize>(
+pub(in crate::job::convert) fn fields<const D: usize>(
     checks: &mut Checks,
     written: &[Written],
     path: &Path,
@@ -54,7 +54,7 @@ fn field<const D: usize>(checks: &mut Checks, written: &Written, path: &Path) ->
 }
 
 /// The stress of a body at the start, or faults.
-pub(super) fn stress<const D: usize>(
+pub(in crate::job::convert) fn stress<const D: usize>(
     checks: &mut Checks,
     written: &Stress,
     file: &JobFile,
@@ -161,7 +161,7 @@ fn consolidation(
 }
 
 /// A fault unless gravity has one component that is not 0 at the start; `instead` is another remedy.
-pub(super) fn needs_vertical_gravity(
+pub(in crate::job::convert) fn needs_vertical_gravity(
     checks: &mut Checks,
     file: &JobFile,
     path: &Path,

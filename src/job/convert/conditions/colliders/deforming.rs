@@ -1,8 +1,8 @@
 //! Colliders that deform: a mesh for each of several times.
-use super::super::checks::{Checks, Space};
 use crate::geometry::Shape;
 use crate::geometry::mesh::{Deforming, Mismatch};
 use crate::geometry::written::Shape as Written;
+use crate::job::convert::checks::{Checks, Space};
 use crate::job::parse::error::QUOTED;
 use crate::job::parse::source::Path;
 use crate::job::schema::conditions::colliders::Frames;

@@ -1,10 +1,10 @@
 //! Quantities of the job file: numbers, expressions, tables over time, and values at places from files.
 use std::sync::Arc;
 
-use super::checks::Checks;
-use super::shapes::RASTERS;
 use crate::geometry::mesh::HeightRaster;
 use crate::geometry::written::Vector;
+use crate::job::convert::checks::Checks;
+use crate::job::convert::shapes::RASTERS;
 use crate::job::parse::error::QUOTED;
 use crate::job::parse::source::Path;
 use crate::job::schema::conditions::loads::{
@@ -15,7 +15,7 @@ use crate::quantity::{AXES, Expression, Field, Quantity, Table, field};
 use crate::text::{excerpt, number};
 
 /// As many quantities as the job has dimensions, or faults.
-pub(super) fn vector<const D: usize>(
+pub(in crate::job::convert) fn vector<const D: usize>(
     checks: &mut Checks,
     written: &[WrittenQuantity],
     path: &Path,
@@ -33,7 +33,7 @@ pub(super) fn vector<const D: usize>(
 }
 
 /// A quantity at nodes, which cannot depend on places of the undeformed body, or a fault.
-pub(super) fn at_nodes<const D: usize>(
+pub(in crate::job::convert) fn at_nodes<const D: usize>(
     checks: &mut Checks,
     written: &WrittenQuantity,
     path: &Path,
@@ -48,7 +48,7 @@ pub(super) fn at_nodes<const D: usize>(
 }
 
 /// A quantity, or a fault.
-pub(super) fn quantity<const D: usize>(
+pub(in crate::job::convert) fn quantity<const D: usize>(
     checks: &mut Checks,
     written: &WrittenQuantity,
     path: &Path,
@@ -78,7 +78,7 @@ pub(super) fn quantity<const D: usize>(
 }
 
 /// A column of a file.
-pub(super) fn column(written: &WrittenColumn) -> Column {
+pub(in crate::job::convert) fn column(written: &WrittenColumn) -> Column {
     match written {
         WrittenColumn::Number(number) => Column::Number(usize::from(*number)),
         WrittenColumn::Name(name) => Column::Name(name.clone()),

@@ -1,7 +1,7 @@
 //! Loads of the job file to those of the solver.
-use super::checks::{Checks, Space};
 use super::quantities::{at_nodes, quantity, vector};
 use crate::geometry::written::Vector;
+use crate::job::convert::checks::{Checks, Space};
 use crate::job::parse::source::Path;
 use crate::job::schema::conditions::loads::{Load as Written, LoadKind, Sharing};
 use crate::job::schema::job_file::JobFile;
@@ -14,7 +14,7 @@ use crate::text::written as number;
 const MAX_SUMS: usize = 108;
 
 /// All loads, or faults.
-pub(super) fn loads<const D: usize>(
+pub(in crate::job::convert) fn loads<const D: usize>(
     checks: &mut Checks,
     file: &JobFile,
     taken: usize,
@@ -147,7 +147,7 @@ fn direction<const D: usize>(
 }
 
 /// Gravity is the same everywhere.
-pub(super) fn gravity<const D: usize>(
+pub(in crate::job::convert) fn gravity<const D: usize>(
     checks: &mut Checks,
     written: &[crate::job::schema::conditions::loads::Quantity],
     path: &Path,

@@ -13,10 +13,10 @@ mod records;
 
 use self::free_bodies::free_body;
 use self::keys::{Z, optional};
-use super::checks::{Checks, Space};
 use crate::boundary::motion::{Motion, Rate, Table};
 use crate::boundary::{ActsOn, Collider, Contact};
 use crate::geometry::{Aabb, Shape, common_point};
+use crate::job::convert::checks::{Checks, Space};
 use crate::job::parse::source::Path;
 use crate::job::schema::common::Spin;
 use crate::job::schema::conditions::colliders::{
@@ -30,7 +30,7 @@ const MAX_COLLIDERS: usize = 16;
 const MOST_BOXES: usize = 10_000;
 
 /// All colliders, or faults.
-pub(in crate::job) fn colliders<const D: usize>(
+pub(in crate::job::convert) fn colliders<const D: usize>(
     checks: &mut Checks,
     colliders: &[file::Collider],
     space: &Space<D>,

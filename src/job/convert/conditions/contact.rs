@@ -1,9 +1,9 @@
 //! Contact between bodies: which bodies share a velocity field, and the law between these.
 use std::collections::BTreeMap;
 
-use super::checks::Checks;
 use crate::boundary::BodyContacts;
 use crate::boundary::bodies::{Pair, PairLaw};
+use crate::job::convert::checks::Checks;
 use crate::job::parse::source::Path;
 use crate::job::schema::conditions::contact::{BodyContact, PairKind, Side};
 use crate::job::schema::job_file::JobFile;
@@ -16,7 +16,11 @@ const MAX_FIELDS: usize = 250;
 type Law = (PairLaw, u16, bool);
 
 /// All contacts between bodies, or faults.
-pub(super) fn body_contacts(checks: &mut Checks, file: &JobFile, path: &Path) -> Option<BodyContacts> {
+pub(in crate::job::convert) fn body_contacts(
+    checks: &mut Checks,
+    file: &JobFile,
+    path: &Path,
+) -> Option<BodyContacts> {
     let bodies = file.body_names();
     let mut laws: BTreeMap<[u16; 2], Law> = BTreeMap::new();
     let (mut names, mut sound) = (Vec::<(String, bool)>::new(), true);

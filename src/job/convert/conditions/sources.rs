@@ -1,9 +1,9 @@
 //! Sources of the job file, and the bodies that they feed.
-use super::bodies::body;
-use super::checks::{Checks, Space};
-use super::settings::is_outflow;
 use crate::geometry::written::Shape as Written;
 use crate::geometry::{Aabb, Side};
+use crate::job::convert::bodies::body;
+use crate::job::convert::checks::{Checks, Space};
+use crate::job::convert::settings::is_outflow;
 use crate::job::parse::source::Path;
 use crate::job::problem::{Body, CELLS_PER_LEAF, TreeSetup};
 use crate::job::schema::common::FASTEST;
@@ -19,7 +19,7 @@ use rustc_hash::FxHashMap;
 const MOST_POINTS: f64 = 2e7;
 
 /// Parts of the job that sources need.
-pub(super) struct Context<'a, const D: usize> {
+pub(in crate::job::convert) struct Context<'a, const D: usize> {
     pub file: &'a JobFile,
     pub space: &'a Space<D>,
     pub tree: &'a TreeSetup<D>,
@@ -28,7 +28,7 @@ pub(super) struct Context<'a, const D: usize> {
 }
 
 /// All sources with their bodies, or faults.
-pub(super) fn sources<const D: usize>(
+pub(in crate::job::convert) fn sources<const D: usize>(
     checks: &mut Checks,
     context: &Context<'_, D>,
     path: &Path,

@@ -1,7 +1,7 @@
 //! Water in the pores.
-use super::checks::{Checks, Space};
 use super::quantities::at_nodes;
 use super::stress::needs_vertical_gravity;
+use crate::job::convert::checks::{Checks, Space};
 use crate::job::parse::error::QUOTED;
 use crate::job::parse::source::Path;
 use crate::job::problem::InStages;
@@ -19,7 +19,7 @@ use crate::text::{excerpt, written as number};
 const NAME: &str = "water";
 
 /// The load of the water in the pores, if the job has any; `None` after faults.
-pub(super) fn water<const D: usize>(
+pub(in crate::job::convert) fn water<const D: usize>(
     checks: &mut Checks,
     file: &JobFile,
     gravity: Option<&Gravity<D>>,
@@ -87,14 +87,16 @@ pub(super) fn water<const D: usize>(
 }
 
 /// The stages in which the job has water, or faults.
-pub(super) fn stages(checks: &mut Checks, file: &JobFile, root: &Path) -> InStages {
+pub(in crate::job::convert) fn stages(checks: &mut Checks, file: &JobFile, root: &Path) -> InStages {
     let written = file.water.iter().map(|water| &water.stages);
     let path = root.key("water");
-    super::stages::of_list(checks, file, written, |_| path.key("stages")).pop().unwrap_or_default()
+    crate::job::convert::stages::of_list(checks, file, written, |_| path.key("stages"))
+        .pop()
+        .unwrap_or_default()
 }
 
 /// The seepage of the job, if it has any; `None` after faults.
-pub(super) fn seepage<const D: usize>(
+pub(in crate::job::convert) fn seepage<const D: usize>(
     checks: &mut Checks,
     file: &JobFile,
     space: &Space<D>,

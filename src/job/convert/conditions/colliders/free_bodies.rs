@@ -1,13 +1,13 @@
 //! Free rigid bodies of the job file to those of the solver: mass and inertia, given or those of the shape.
 use std::cell::OnceCell;
 
-use super::super::checks::Checks;
 use super::keys::{Z, allowed, optional};
 use super::records;
 use crate::boundary::motion::{Free, Rate, Table};
 use crate::boundary::rigid::{Meeting, turning};
 use crate::boundary::vector::length;
 use crate::geometry::{Moments, Shape};
+use crate::job::convert::checks::Checks;
 use crate::job::parse::source::Path;
 use crate::job::schema::common::Spin;
 use crate::job::schema::conditions::colliders::{Inertia, Motion as Written};
