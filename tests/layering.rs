@@ -1,6 +1,7 @@
 //! Claim: folders of `src/` are floors, and nothing imports from a floor above its own. The list of floors is
 //! that of `ARCHITECTURE.md`, so the map there is the one that the compiler's input follows. Files do not
-//! import in circles, those of `post/` and `cli/` neither. Tests start MPI in processes of their own.
+//! import in circles, those of `post/` and `cli/` neither. No folder has more files than a reader takes in
+//! at a glance. Tests start MPI in processes of their own.
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::Path;
@@ -322,6 +323,40 @@ fn each_floor_exists() {
         let there: BTreeSet<String> = sources.keys().filter_map(|file| below(folder, file)).collect();
         let listed: BTreeSet<String> = floors(&page(), heading).into_iter().flatten().collect();
         assert_eq!(there, listed, "{heading}");
+    }
+}
+
+/// Most source files of a folder; files in its folders count there.
+const MOST_FILES: usize = 12;
+
+/// Folders with more, each with its reason.
+const LARGE: [&str; 2] = [
+    // To be split.
+    "src/solver/step",
+    // To be split.
+    "src/solver/state",
+];
+
+#[test]
+fn folders_have_at_most_twelve_files() {
+    let mut counts: BTreeMap<String, usize> = BTreeMap::new();
+    for package in ["src", "post/src", "cli", "partition/src"] {
+        let mut sources = Sources::new();
+        read_sources(
+            &Path::new(env!("CARGO_MANIFEST_DIR")).join(package),
+            &format!("{package}/"),
+            &mut sources,
+        );
+        let folders = sources.keys().filter_map(|file| file.rsplit_once('/'));
+        folders.for_each(|(folder, _)| *counts.entry(folder.to_owned()).or_default() += 1);
+    }
+    assert!(counts.contains_key("src/job/convert") && counts.contains_key("cli"), "{counts:?}");
+    for (folder, count) in &counts {
+        let is_large = *count > MOST_FILES;
+        match LARGE.contains(&folder.as_str()) {
+            true => assert!(is_large, "{folder} has {count} files: remove it from the list"),
+            false => assert!(!is_large, "{folder} has {count} files: group what belongs together"),
+        }
     }
 }
 
