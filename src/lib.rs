@@ -19,6 +19,7 @@ pub mod particle;
 pub mod probe;
 pub mod quantity;
 pub mod run;
+pub mod saved;
 pub mod setup;
 pub mod simd;
 pub mod solver;

@@ -69,8 +69,9 @@ impl<const D: usize> Run<'_, D> {
     }
 
     /// Collective. Scalars of a state, beside particles and tree.
-    pub(super) fn scalars(&self, next_output: u64, output_step: Option<u64>) -> Scalars {
-        let mut scalars = restart::scalars(self.comm, self.problem, &self.solver, next_output, output_step);
+    pub(super) fn scalars(&mut self, next_output: u64, output_step: Option<u64>) -> Scalars {
+        let mut scalars =
+            restart::scalars(self.comm, self.problem, &mut self.solver, next_output, output_step);
         scalars.counts.extend(self.recorder.last_row().map(|step| (restart::ROW_STEP.into(), step)));
         scalars
     }

@@ -15,6 +15,7 @@
 //! | [`refinement`] | dynamic refinement |
 //! | [`balance`] | load balance: measured costs, new partitions |
 //! | [`stage`] | the next stage of a run |
+//! | `saved` | scalars of the state in files |
 //! | [`diagnostics`] | totals; weights of given boxes |
 pub mod balance;
 pub mod diagnostics;
@@ -22,6 +23,7 @@ pub mod migration;
 pub mod physics;
 mod quasi_static;
 pub mod refinement;
+mod saved;
 mod seepage;
 pub mod sorting;
 pub mod stage;

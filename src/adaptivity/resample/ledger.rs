@@ -3,6 +3,7 @@ use partition::comm::Comm;
 
 use crate::adaptivity::resample::cell_fit::Splits;
 use crate::exact_sum::ExactSum;
+use crate::saved::Saved;
 
 /// Counts and energies of splits and merges since the start of the run: sums of this rank, except for the
 /// root.
@@ -43,9 +44,26 @@ pub struct LedgerTotals {
     pub merge_energy: f64,
 }
 
+/// Name of the counter of the first root that no particle has had.
+pub const NEXT_ROOT: &str = "next_root";
+
 impl Ledger {
-    /// Collective. Counts of all ranks and the words of the two energies, as a checkpoint needs them.
-    pub fn gather(&self, comm: &Comm) -> ([u64; 4], [ExactSum; 2]) {
+    /// Collective to a file. All but the counts of those halved and refused, which begin with the process.
+    pub fn save(&mut self, saved: &mut Saved<'_>) {
+        let counts = [&mut self.splits, &mut self.merges, &mut self.removed];
+        saved.counts_of_ranks(["splits", "merges", "particles_merged_away"], counts);
+        let energies = ["split_energy", "merge_energy"];
+        saved.sums(|i| energies[i].into(), [&mut self.split_energy, &mut self.merge_energy].into_iter());
+        self.save_next_root(saved);
+    }
+
+    /// The first free root.
+    pub fn save_next_root(&mut self, saved: &mut Saved<'_>) {
+        saved.count(NEXT_ROOT, &mut self.next_root);
+    }
+
+    /// Collective. Counts of all ranks and the two energies.
+    fn gather(&self, comm: &Comm) -> ([u64; 4], [ExactSum; 2]) {
         let mut counts = [self.splits, self.refused, self.merges, self.removed];
         comm.sum_u64(&mut counts);
         let mut energies = [self.split_energy.clone(), self.merge_energy.clone()];

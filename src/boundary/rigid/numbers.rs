@@ -4,11 +4,26 @@ use nalgebra::{Quaternion, UnitQuaternion};
 use super::turning::quaternion;
 use crate::boundary::motion::{Pose, Rate};
 use crate::boundary::{Collider, ColliderState};
+use crate::saved::Saved;
 
 impl<const D: usize> Collider<D> {
+    /// The state of a free body, the collider numbered `index`; others follow from the time.
+    pub fn save(&self, index: usize, state: &mut ColliderState<D>, saved: &mut Saved<'_>) {
+        if self.free().is_none() {
+            return;
+        }
+        let mut numbers = self.numbers(state);
+        for (i, number) in numbers.iter_mut().enumerate() {
+            saved.real(format!("collider_{index}_state_{i}"), number);
+        }
+        if saved.is_reading() {
+            *state = self.from_numbers(&numbers);
+        }
+    }
+
     /// A state as numbers: translation, velocity, angle, angular velocity, and of a body that turns about any
     /// axis orientation and angular momentum.
-    pub fn numbers(&self, state: &ColliderState<D>) -> Vec<f64> {
+    fn numbers(&self, state: &ColliderState<D>) -> Vec<f64> {
         let ColliderState { pose, rate, momentum } = state;
         let mut all = pose.translation.to_vec();
         all.extend(rate.velocity);
@@ -20,25 +35,19 @@ impl<const D: usize> Collider<D> {
         all
     }
 
-    /// A state from its numbers, each given by `number`. `None` if one is missing.
-    pub fn from_numbers(&self, number: impl Fn(usize) -> Option<f64>) -> Option<ColliderState<D>> {
-        let (mut translation, mut velocity) = ([0.0; D], [0.0; D]);
-        for a in 0..D {
-            (translation[a], velocity[a]) = (number(a)?, number(D + a)?);
-        }
-        let rate = Rate::about_axis(velocity, number(2 * D + 1)?);
+    /// A state from its numbers.
+    fn from_numbers(&self, numbers: &[f64]) -> ColliderState<D> {
+        let translation = std::array::from_fn(|a| numbers[a]);
+        let velocity = std::array::from_fn(|a| numbers[D + a]);
+        let (angle, rate) = (numbers[2 * D], Rate::about_axis(velocity, numbers[2 * D + 1]));
         let Some(inertia) = self.free().and_then(|free| free.turning) else {
-            return Some(self.state((translation, number(2 * D)?), rate));
+            return self.state((translation, angle), rate);
         };
-        let mut rest = [0.0; 7];
-        for (k, part) in rest.iter_mut().enumerate() {
-            *part = number(2 * D + 2 + k)?;
-        }
-        let [w, x, y, z, momentum @ ..] = rest;
+        let [w, x, y, z, momentum @ ..]: [f64; 7] = std::array::from_fn(|k| numbers[2 * D + 2 + k]);
         // As it was: a length of one that is found anew would change the last digits.
         let orientation = UnitQuaternion::new_unchecked(Quaternion::new(w, x, y, z));
         let rate = Rate { turning: inertia.spin(&momentum, &orientation), ..rate };
-        Some(ColliderState { pose: Pose::oriented(translation, orientation), rate, momentum })
+        ColliderState { pose: Pose::oriented(translation, orientation), rate, momentum }
     }
 
     /// Whether it is a free body that turns about any axis.

@@ -2,9 +2,9 @@
 
 use partition::{MAX_LEVEL, Octant};
 
-use super::scalars::Scalars;
 use super::view::View;
 use crate::io::hdf5_file::{FileError, Reader, Writer};
+use crate::saved::Scalars;
 
 /// Version of the layout of the state. A file of another one is refused.
 pub const FORMAT: u64 = 2;

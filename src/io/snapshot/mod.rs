@@ -33,6 +33,7 @@ mod place;
 mod scalars;
 mod view;
 
+pub use crate::saved::Scalars;
 pub use content::fields::PointField;
 pub use content::state::Restored;
 use content::{state, vtkhdf};
@@ -45,7 +46,7 @@ pub use intact::sane::Limits;
 pub use options::Options;
 pub use outputs::Outputs;
 pub use place::job_files;
-pub use scalars::{AXISYMMETRIC, Scalars};
+pub use scalars::AXISYMMETRIC;
 pub use view::{ShownWater, View};
 
 /// Collective. Writes particles, and the state if `options` ask for it, to `path`. An error on any rank is

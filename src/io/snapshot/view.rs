@@ -3,11 +3,11 @@ use std::path::Path;
 
 use partition::{Brick, Octant};
 
-use super::scalars::Scalars;
 use crate::load::Water;
 use crate::particle::chunk::Chunk;
 use crate::particle::followed::Followed;
 use crate::probe::{Map, Maxima};
+use crate::saved::Scalars;
 
 /// The run as a file shows it: borrowed, this rank's part.
 #[derive(Clone, Copy, Debug)]

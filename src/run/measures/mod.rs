@@ -10,13 +10,11 @@ pub(super) mod maps;
 
 use std::path::Path;
 
-use partition::comm::Comm;
-
 use crate::checksum::fnv1a;
-use crate::exact_sum::ExactSum;
-use crate::io::snapshot::{self, Scalars};
+use crate::io::snapshot;
 use crate::job::Problem;
-use crate::probe::{Map, Maxima, Tracked};
+use crate::probe::{Map, Maxima};
+use crate::saved::Saved;
 use crate::solver::Solver;
 use crate::solver::migration::fluxes::Fluxes;
 
@@ -25,24 +23,24 @@ fn measure(kind: &str, name: &str, what: &str) -> String {
     format!("{kind}_{what}{:016x}", fnv1a(name.bytes().map(u64::from)))
 }
 
-/// Collective. Appends the masses of fluxes, and the places of tracks.
-pub(super) fn write<const D: usize>(
-    comm: &Comm,
-    problem: &Problem<D>,
-    solver: &Solver<D>,
-    reals: &mut Vec<(String, f64)>,
-    counts: &mut Vec<(String, u64)>,
-    exact: &mut Vec<(String, Vec<i64>)>,
-) {
-    let mut sums = solver.measured.crossings.fluxes.gather(comm);
-    let fluxes = problem.fluxes.iter().zip(&mut sums);
-    exact.extend(fluxes.map(|(flux, sum)| (measure("flux", &flux.name, ""), sum.words().to_vec())));
-    for (track, tracked) in problem.tracks.iter().zip(&solver.measured.tracked) {
+/// Collective to a file. Masses of fluxes, and places of tracks; those that a file lacks begin where the run
+/// goes on.
+pub(super) fn save<const D: usize>(problem: &Problem<D>, solver: &mut Solver<D>, saved: &mut Saved<'_>) {
+    let measured = &mut solver.measured;
+    for (flux, sum) in problem.fluxes.iter().zip(&mut measured.crossings.fluxes.sums) {
+        let sum = std::iter::once(sum);
+        saved.if_there(|saved| saved.sums(|_| measure("flux", &flux.name, ""), sum));
+    }
+    for (track, tracked) in problem.tracks.iter().zip(&mut measured.tracked) {
+        let number = |what: &str| measure("track", &track.name, what);
         // Halves of an identifier are numbers that counts may be.
-        let halves = [("low_", tracked.id & HALF), ("high_", tracked.id >> 32)];
-        counts.extend(halves.map(|(half, id)| (measure("track", &track.name, half), id)));
-        let place = tracked.place.iter().enumerate();
-        reals.extend(place.map(|(a, &x)| (measure("track", &track.name, &format!("{a}_")), x)));
+        let (mut low, mut high) = (tracked.id & HALF, tracked.id >> 32);
+        saved.if_there(|saved| {
+            saved.count(number("low_"), &mut low);
+            saved.count(number("high_"), &mut high);
+            tracked.place.iter_mut().enumerate().for_each(|(a, x)| saved.real(number(&format!("{a}_")), x));
+        });
+        tracked.id = low | high << 32;
     }
 }
 
@@ -57,30 +55,8 @@ pub(super) fn begin<const D: usize>(problem: &Problem<D>, solver: &mut Solver<D>
     solver.measured.maxima = problem.maps.iter().map(Map::nothing).collect();
 }
 
-/// Takes over the masses of fluxes (on rank 0), the places of tracks and the maxima of maps from the file at
-/// `path`. Measurements that the file lacks begin here.
-pub(super) fn restore<const D: usize>(
-    rank: usize,
-    problem: &Problem<D>,
-    solver: &mut Solver<D>,
-    scalars: &Scalars,
-    path: &Path,
-) {
-    begin(problem, solver);
-    for (flux, sum) in problem.fluxes.iter().zip(&mut solver.measured.crossings.fluxes.sums) {
-        let read = scalars.exact(&measure("flux", &flux.name, "")).and_then(ExactSum::from_words);
-        if let Some(read) = read {
-            *sum = if rank == 0 { read } else { ExactSum::new() };
-        }
-    }
-    for (track, tracked) in problem.tracks.iter().zip(&mut solver.measured.tracked) {
-        let half = |half| scalars.count(&measure("track", &track.name, half));
-        let coordinate = |a: usize| scalars.real(&measure("track", &track.name, &format!("{a}_")));
-        let place: Option<Vec<f64>> = (0..D).map(coordinate).collect();
-        if let (Some(low), Some(high), Some(place)) = (half("low_"), half("high_"), place) {
-            *tracked = Tracked { id: low | high << 32, place: std::array::from_fn(|a| place[a]) };
-        }
-    }
+/// Reads the maxima of maps from the file at `path`; of maps that it lacks they begin here.
+pub(super) fn read_maps<const D: usize>(problem: &Problem<D>, solver: &mut Solver<D>, path: &Path) {
     for (map, maxima) in problem.maps.iter().zip(&mut solver.measured.maxima) {
         let [depth, speed] =
             ["depth", "speed"].map(|what| snapshot::map_values(path, &map.name, what, map.len()));

@@ -12,6 +12,7 @@ use crate::boundary::{Collider, ColliderState};
 use crate::geometry::{Aabb, Shape};
 use crate::io::snapshot::{self, Header, PointField, View, directory};
 use crate::job::{self, AnyProblem, Problem};
+use crate::saved::Saved;
 use crate::setup::stages;
 use crate::solver::physics::Physics;
 
@@ -150,8 +151,9 @@ fn at<const D: usize>(problem: &Problem<D>, header: &Header) -> Scene {
     let mut physics = stages::physics(problem, &starts);
     physics.colliders.iter_mut().for_each(|collider| collider.deform(header.time));
     let state = |(number, collider): (usize, &Collider<D>)| {
-        restart::collider_state(number, collider, &header.scalars)
-            .unwrap_or_else(|| collider.state_at(header.time))
+        let mut state = collider.state_at(header.time);
+        collider.save(number, &mut state, &mut Saved::from_file(&header.scalars, true));
+        state
     };
     let states: Vec<_> = physics.colliders.iter().enumerate().map(state).collect();
     Scene { solids: solids(&physics.colliders, &states, problem.origin), boxes: Some(boxes(&physics)) }

@@ -6,6 +6,7 @@ use super::gone::Gone;
 use crate::boundary::{Contact, Leaving};
 use crate::exact_sum::ExactSum;
 use crate::quantity::FACES;
+use crate::saved::Saved;
 use crate::solver::physics::Physics;
 use crate::text::{count, quantity};
 
@@ -137,6 +138,14 @@ impl Crossings {
                 self.fluxes.book(gone);
             }
         }
+    }
+
+    /// Collective to a file. The counts and masses, without fluxes.
+    pub(in crate::solver) fn save(&mut self, saved: &mut Saved<'_>) {
+        let counts = [&mut self.put_back, &mut self.deleted, &mut self.left];
+        saved.counts_of_ranks(["put_back", "deleted", "left"], counts);
+        let masses = ["deleted_mass", "left_mass"];
+        saved.sums(|i| masses[i].into(), self.masses.iter_mut());
     }
 
     /// Collective. Those of all ranks, without fluxes.

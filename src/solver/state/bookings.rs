@@ -5,6 +5,7 @@ use partition::comm::Comm;
 use crate::boundary::ColliderState;
 use crate::boundary::rigid::Features;
 use crate::exact_sum::ExactSum;
+use crate::saved::Saved;
 use crate::solver::physics::Physics;
 
 /// Components of an impulse and of an angular impulse.
@@ -35,19 +36,23 @@ impl<const N: usize> ExactSums<N> {
         Self { of: vec![std::array::from_fn(|_| ExactSum::new()); things], since: time }
     }
 
-    /// Collective. Totals over all ranks, exact before they are rounded once.
-    pub fn totals(&self, comm: &Comm) -> Vec<[f64; N]> {
-        let all = self.exact_totals(comm);
-        all.chunks_exact(N).map(|sums| std::array::from_fn(|i| sums[i].to_f64())).collect()
+    /// Collective to a file. The sums of one kind of things (loads, colliders, …), numbered consecutively.
+    pub(in crate::solver) fn save(&mut self, kind: &str, saved: &mut Saved<'_>) {
+        if self.of.is_empty() {
+            return;
+        }
+        saved.real(format!("{kind}_sums_since"), &mut self.since);
+        let sums: Vec<&mut ExactSum> = self.of.iter_mut().flatten().collect();
+        saved.sums(|i| format!("{kind}_sum_{i}"), sums.into_iter());
     }
 
-    /// Collective. As [`ExactSums::totals`], not rounded: those of one thing after those of another.
-    pub fn exact_totals(&self, comm: &Comm) -> Vec<ExactSum> {
+    /// Collective. Totals over all ranks, exact before they are rounded once.
+    pub fn totals(&self, comm: &Comm) -> Vec<[f64; N]> {
         let mut all: Vec<ExactSum> = self.of.iter().flatten().cloned().collect();
         if !all.is_empty() {
             ExactSum::sum_over_ranks(comm, &mut all);
         }
-        all
+        all.chunks_exact(N).map(|sums| std::array::from_fn(|i| sums[i].to_f64())).collect()
     }
 
     /// Mean rate of a sum since the last row, per second, at a time up to which forces have acted (s); 0 at

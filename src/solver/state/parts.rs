@@ -13,6 +13,7 @@ use crate::adaptivity::resample::ledger::Ledger;
 use crate::exact_sum::ExactSum;
 use crate::material::SHOCK_SUMS;
 use crate::probe::{Maxima, Tracked};
+use crate::saved::Saved;
 use crate::solver::migration::crossings::Crossings;
 use crate::solver::physics::Physics;
 
@@ -64,6 +65,22 @@ impl Sums {
             unsettled_heads: 0,
             fed: vec![[0; 2]; physics.sources.len()],
         }
+    }
+}
+
+impl Sums {
+    /// Collective to a file. Those that begin with the process stay out.
+    pub(in crate::solver) fn save(&mut self, saved: &mut Saved<'_>) {
+        self.sources.save("source", saved);
+        self.failed.save("failed", saved);
+        self.pores.save("pore_water", saved);
+        self.flow.save("flow", saved);
+        self.loads.save("load", saved);
+        self.bodies.save("contact", saved);
+        self.shifts.save("shift", saved);
+        // A job may ask for these later than the run that has written the file: then they begin here.
+        saved.if_there(|saved| self.shocks.save("shock", saved));
+        saved.if_there(|saved| self.faces.save("face", saved));
     }
 }
 

@@ -1,4 +1,5 @@
 //! Progress of kinetic damping towards equilibrium.
+use crate::saved::Saved;
 use crate::solver::physics::Equilibrium;
 use crate::text::quantity;
 
@@ -33,7 +34,23 @@ pub enum RelaxPhase {
     FromRest,
 }
 
+/// Kinds of steps by the number that files have for them.
+const PHASES: [RelaxPhase; 3] = [RelaxPhase::Falling, RelaxPhase::Stopped, RelaxPhase::FromRest];
+
 impl Relaxation {
+    pub(in crate::solver) fn save(&mut self, saved: &mut Saved<'_>) {
+        saved.real("relaxation_kinetic_energy", &mut self.kinetic);
+        saved.real("relaxation_speed", &mut self.speed);
+        saved.real("relaxation_acceleration", &mut self.acceleration);
+        saved.count("relaxation_stops", &mut self.stops);
+        let mut phase = PHASES.iter().position(|other| *other == self.phase).unwrap_or_default() as u64;
+        saved.count("relaxation_phase", &mut phase);
+        match usize::try_from(phase).ok().and_then(|phase| PHASES.get(phase)) {
+            Some(phase) => self.phase = *phase,
+            None => saved.lacks("relaxation_phase"),
+        }
+    }
+
     /// After a step in which forces acted over `kick` (s), and nodes with this mass of material (kg) had a
     /// kinetic energy, and after a step from rest `½ kick² Σ f² / m` of the forces on them, J. The second
     /// differs from the first with mass scaling alone, where the root mean square of the velocities is one of
