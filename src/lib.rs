@@ -18,6 +18,7 @@ pub mod memory;
 pub mod particle;
 pub mod probe;
 pub mod quantity;
+pub mod row;
 pub mod run;
 pub mod saved;
 pub mod setup;

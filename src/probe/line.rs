@@ -3,6 +3,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::{Measured, Readings};
+use crate::row::Row;
 
 /// Points at which the material is averaged.
 #[derive(Clone, Debug)]
@@ -84,35 +85,29 @@ impl<const D: usize> Line<D> {
         self.quantities.iter().filter_map(|quantity| quantity.mean()).collect()
     }
 
-    /// Names and units of the columns behind step and time, in the order of [`Line::values`].
-    pub fn columns(&self) -> Vec<(String, &'static str)> {
-        let mut columns = vec![("point".to_owned(), "")];
-        columns.extend(["x", "y", "z"][..D].iter().map(|axis| ((*axis).to_owned(), "m")));
-        columns.push(("level".to_owned(), ""));
+    /// Adds the columns behind step and time: a row for each point, counted from 1. `origin` is the lower
+    /// corner of the domain, m.
+    pub fn add_to(&self, row: &mut Row, of: Option<(usize, &Sample<D>)>, origin: &[f64]) {
+        row.add(format_args!("point"), "", of.map(|(point, _)| (point + 1) as f64));
+        let place = |(point, _): (usize, _)| -> [f64; D] {
+            std::array::from_fn(|a| origin[a] + self.points[point][a])
+        };
+        row.vector(format_args!(""), &["x", "y", "z"][..D], "m", of.map(place));
+        row.add(format_args!("level"), "", of.map(|(_, sample)| f64::from(sample.level)));
+        let sample = of.map(|(_, sample)| sample);
         for quantity in &self.quantities {
             match quantity.mean() {
-                Some(mean) => columns.extend(mean.columns::<D>("")),
-                None if *quantity == Sampled::Density => columns.push(("density".to_owned(), "kg/m³")),
-                None => columns.push(("volume_fraction".to_owned(), "")),
+                Some(mean) => mean.add_to(row, "", sample.map(|sample| &sample.sums), origin),
+                None if *quantity == Sampled::Density => {
+                    let density = |sample: &Sample<D>| sample.sums.mass / sample.cell;
+                    row.add(format_args!("density"), "kg/m³", sample.map(density));
+                }
+                None => {
+                    let fraction = |sample: &Sample<D>| sample.sums.volume / sample.cell;
+                    row.add(format_args!("volume_fraction"), "", sample.map(fraction));
+                }
             }
         }
-        columns
-    }
-
-    /// The values of a row: those of one point, counted from 1. `origin` is the lower corner of the domain,
-    /// m.
-    pub fn values(&self, point: usize, sample: &Sample<D>, origin: &[f64]) -> Vec<f64> {
-        let mut values = vec![(point + 1) as f64];
-        values.extend((0..D).map(|a| origin[a] + self.points[point][a]));
-        values.push(f64::from(sample.level));
-        for quantity in &self.quantities {
-            match quantity.mean() {
-                Some(mean) => mean.values(&sample.sums, origin, &mut values),
-                None if *quantity == Sampled::Density => values.push(sample.sums.mass / sample.cell),
-                None => values.push(sample.sums.volume / sample.cell),
-            }
-        }
-        values
     }
 }
 

@@ -18,6 +18,7 @@ pub use map::{Map, Maxima};
 pub use track::{Track, Tracked};
 
 use crate::geometry::Shape;
+use crate::row::{AXES, Row};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -76,96 +77,62 @@ pub enum Measured {
     Extent,
 }
 
-/// Names and units of the columns of quantities, in the order of [`values`]. `suffix` follows the stem of
-/// each name.
-pub fn columns<const D: usize>(quantities: &[Measured], suffix: &str) -> Vec<(String, &'static str)> {
-    quantities.iter().flat_map(|quantity| quantity.columns::<D>(suffix)).collect()
-}
-
-/// Values of quantities in a row of the history. `origin` is the lower corner of the domain, m.
-pub fn values<const D: usize>(quantities: &[Measured], readings: &Readings<D>, origin: &[f64]) -> Vec<f64> {
-    let mut values = Vec::new();
-    quantities.iter().for_each(|quantity| quantity.values(readings, origin, &mut values));
-    values
-}
-
-/// Axes as parts of names.
-const AXES: [&str; 3] = ["_x", "_y", "_z"];
+/// Ends of the names of the components of a stress.
+const STRESS: [&str; 6] = ["_xx", "_yy", "_zz", "_xy", "_xz", "_yz"];
 
 impl Measured {
-    /// Names and units of its columns.
-    fn columns<const D: usize>(self, suffix: &str) -> Vec<(String, &'static str)> {
-        let (stem, unit) = self.stem_and_unit();
-        let stems: &[&str] = if self == Self::Extent { &["least", "greatest"] } else { &[stem] };
-        let of_stem = |stem: &&str| {
-            let stem = (*stem).to_owned();
-            self.components::<D>().iter().map(move |component| (format!("{stem}{suffix}{component}"), unit))
-        };
-        stems.iter().flat_map(of_stem).collect()
-    }
-
-    /// Its values, appended to those of a row.
-    fn values<const D: usize>(self, of: &Readings<D>, origin: &[f64], values: &mut Vec<f64>) {
+    /// Adds its columns, with `suffix` between the stem of each name and its component. `origin` is the lower
+    /// corner of the domain, m.
+    pub fn add_to<const D: usize>(
+        self,
+        row: &mut Row,
+        suffix: &str,
+        of: Option<&Readings<D>>,
+        origin: &[f64],
+    ) {
         let mean = |sum: f64, of: f64| if of > 0.0 { sum / of } else { f64::NAN };
+        let axes = &AXES[..D];
+        let mut add = |stem: &str, unit, value| row.add(format_args!("{stem}{suffix}"), unit, value);
         match self {
-            Self::Mass => values.push(of.mass),
-            Self::Volume => values.push(of.volume),
-            Self::Centre => {
-                values.extend((0..D).map(|a| origin[a] + mean(of.mass_place[a], of.mass)));
-            }
-            Self::Velocity => values.extend(of.momentum.map(|sum| mean(sum, of.mass))),
-            Self::Momentum => values.extend(of.momentum),
-            Self::GreatestSpeed => values.push(of.greatest_speed),
-            Self::KineticEnergy => values.push(of.energies[0]),
-            Self::ElasticEnergy => values.push(of.energies[1]),
-            Self::PlasticWork => values.push(of.energies[2]),
-            Self::Stress => {
-                let components = &of.volume_stress[..self.components::<D>().len()];
-                values.extend(components.iter().map(|sum| mean(*sum, of.volume)));
-            }
+            Self::Mass => add("mass", "kg", of.map(|of| of.mass)),
+            Self::Volume => add("volume", "m³", of.map(|of| of.volume)),
+            Self::GreatestSpeed => add("greatest_speed", "m/s", of.map(|of| of.greatest_speed)),
+            Self::KineticEnergy => add("kinetic_energy", "J", of.map(|of| of.energies[0])),
+            Self::ElasticEnergy => add("elastic_energy", "J", of.map(|of| of.energies[1])),
+            Self::PlasticWork => add("plastic_work", "J", of.map(|of| of.energies[2])),
             Self::Pressure => {
-                let [xx, yy, zz, ..] = of.volume_stress;
-                values.push(mean(-(xx + yy + zz) / 3.0, of.volume));
+                let sum = |[xx, yy, zz, ..]: [f64; 6]| -(xx + yy + zz) / 3.0;
+                add("pressure", "Pa", of.map(|of| mean(sum(of.volume_stress), of.volume)));
             }
-            Self::PlasticStrain => values.push(mean(of.volume_strain, of.volume)),
-            Self::PorePressure => values.push(mean(of.volume_pores, of.volume)),
-            Self::Extent => {
-                let is_empty = of.mass <= 0.0;
-                let place = |side: &[f64; D]| -> [f64; D] {
-                    std::array::from_fn(|a| if is_empty { f64::NAN } else { origin[a] + side[a] })
+            Self::PlasticStrain => add("plastic_strain", "", of.map(|of| mean(of.volume_strain, of.volume))),
+            Self::PorePressure => add("pore_pressure", "Pa", of.map(|of| mean(of.volume_pores, of.volume))),
+            Self::Centre => {
+                let place = |of: &Readings<D>| -> [f64; D] {
+                    std::array::from_fn(|a| origin[a] + mean(of.mass_place[a], of.mass))
                 };
-                values.extend(of.extent.iter().flat_map(place));
+                row.vector(format_args!("centre{suffix}"), axes, "m", of.map(place));
             }
-        }
-    }
-
-    /// How the names of its columns begin, and their unit.
-    fn stem_and_unit(self) -> (&'static str, &'static str) {
-        match self {
-            Self::Mass => ("mass", "kg"),
-            Self::Volume => ("volume", "m³"),
-            Self::Centre => ("centre", "m"),
-            Self::Velocity => ("velocity", "m/s"),
-            Self::Momentum => ("momentum", "kg m/s"),
-            Self::GreatestSpeed => ("greatest_speed", "m/s"),
-            Self::KineticEnergy => ("kinetic_energy", "J"),
-            Self::ElasticEnergy => ("elastic_energy", "J"),
-            Self::PlasticWork => ("plastic_work", "J"),
-            Self::Stress => ("stress", "Pa"),
-            Self::Pressure => ("pressure", "Pa"),
-            Self::PlasticStrain => ("plastic_strain", ""),
-            Self::PorePressure => ("pore_pressure", "Pa"),
-            Self::Extent => ("extent", "m"),
-        }
-    }
-
-    /// How the names of its columns end.
-    fn components<const D: usize>(self) -> &'static [&'static str] {
-        match self {
-            Self::Centre | Self::Velocity | Self::Momentum | Self::Extent => &AXES[..D],
-            Self::Stress if D == 2 => &["_xx", "_yy", "_zz", "_xy"],
-            Self::Stress => &["_xx", "_yy", "_zz", "_xy", "_xz", "_yz"],
-            _ => &[""],
+            Self::Velocity => {
+                let velocity = |of: &Readings<D>| of.momentum.map(|sum| mean(sum, of.mass));
+                row.vector(format_args!("velocity{suffix}"), axes, "m/s", of.map(velocity));
+            }
+            Self::Momentum => {
+                row.vector(format_args!("momentum{suffix}"), axes, "kg m/s", of.map(|of| of.momentum));
+            }
+            Self::Stress => {
+                let stress = |of: &Readings<D>| of.volume_stress.map(|sum| mean(sum, of.volume));
+                let ends = &STRESS[..if D == 2 { 4 } else { 6 }];
+                row.vector(format_args!("stress{suffix}"), ends, "Pa", of.map(stress));
+            }
+            Self::Extent => {
+                for (side, stem) in ["least", "greatest"].iter().enumerate() {
+                    let place = |of: &Readings<D>| -> [f64; D] {
+                        let at = |a: usize| origin[a] + of.extent[side][a];
+                        std::array::from_fn(|a| if of.mass <= 0.0 { f64::NAN } else { at(a) })
+                    };
+                    row.vector(format_args!("{stem}{suffix}"), axes, "m", of.map(place));
+                }
+            }
         }
     }
 }
@@ -229,8 +196,9 @@ mod tests {
             greatest_speed: 0.0,
             extent: [[f64::INFINITY; D], [f64::NEG_INFINITY; D]],
         };
-        let values = values(&ALL, &nothing, &[0.0; 3]);
-        let columns = columns::<D>(&ALL, "_p");
+        let add = |row: &mut Row, of| ALL.iter().for_each(|q| q.add_to::<D>(row, "_p", of, &[0.0; 3]));
+        let values = Row::values(|row| add(row, Some(&nothing)));
+        let columns = Row::names(|row| add(row, None));
         assert_eq!(columns.len(), values.len());
         // Sums of nothing are 0, means of nothing are no number, and nothing is infinite.
         for ((name, _), value) in columns.iter().zip(values) {

@@ -1,150 +1,162 @@
 //! Rows of `history.csv`.
+use std::fmt::Arguments;
+
 use crate::adaptivity::resample::ledger::LedgerTotals;
 use crate::boundary::motion::Motion;
 use crate::boundary::rigid::turning::quaternion;
 use crate::boundary::{Collider, ColliderState};
 use crate::exact_sum::ExactSum;
-use crate::io::log::history::Column;
 use crate::job::Problem;
+use crate::job::problem::Coordinates;
 use crate::load::Water;
-use crate::material::Failed;
-use crate::probe;
+use crate::material::{Failed, SHOCK_SUMS};
+use crate::probe::Readings;
+use crate::row::{AXES, Row};
 use crate::setup;
-use crate::solver::Effort;
 use crate::solver::diagnostics::totals::{GridTotals, ParticleTotals};
 use crate::solver::migration::crossings::Crossings;
 use crate::solver::state::bookings::{FAILED_SUMS, ForceAndWork, Reaction, SOURCE_SUMS};
 use crate::solver::state::relaxation::Relaxation;
+use crate::solver::{Effort, Solver};
 
-const fn column(name: &'static str, unit: &'static str) -> Column<'static> {
-    Column { name, unit }
+/// The state of a step in sums over all ranks, with what it belongs to.
+pub struct Totals<'a, const D: usize> {
+    /// The solver.
+    pub solver: &'a Solver<D>,
+    /// Sums over particles.
+    pub particles: ParticleTotals,
+    /// Sums over nodes.
+    pub grid: GridTotals,
+    /// Particles that crossed faces.
+    pub crossings: Crossings,
+    /// Splits and merges; none without adaptivity.
+    pub ledger: Option<LedgerTotals>,
+    /// Work of the shift of fluids, J; none without fluids.
+    pub shift_work: Option<f64>,
+    /// Work and heat of artificial viscosity, J; none without.
+    pub shock_work: Option<[f64; SHOCK_SUMS]>,
+    /// Of each source.
+    pub sources: Vec<[f64; SOURCE_SUMS]>,
+    /// Of particles that have failed; none where none can.
+    pub failed: Option<[f64; FAILED_SUMS]>,
+    /// Of the water that has come into pores.
+    pub pores: Vec<[f64; SOURCE_SUMS]>,
+    /// Flow at each head and through the surface, m³/s.
+    pub flows: Vec<[f64; 1]>,
+    /// Of each load.
+    pub loads: Vec<ForceAndWork>,
+    /// Of each contact between bodies.
+    pub bodies: Vec<ForceAndWork>,
+    /// Of each probe.
+    pub probes: Vec<Readings<D>>,
+    /// Of each track.
+    pub tracks: Vec<Readings<D>>,
+    /// Mass that has passed each flux, kg.
+    pub passed: Vec<f64>,
+    /// Force on each face of the domain, N.
+    pub faces: Vec<[f64; 3]>,
+    /// Thrust of the water on each face, N.
+    pub thrust_on_faces: Vec<f64>,
+    /// Force and torque on each collider.
+    pub reactions: Vec<Reaction>,
+    /// Force of the water on each collider, N.
+    pub thrust_on_colliders: Vec<[f64; D]>,
 }
 
-/// Columns after the step, without those of colliders.
-const COLUMNS: [Column<'static>; 20] = [
-    column("time", "s"),
-    column("dt", "s"),
-    column("kinetic_energy", "J"),
-    column("elastic_energy", "J"),
-    column("gravitational_energy", "J"),
-    column("plastic_work", "J"),
-    column("momentum_x", "kg m/s"),
-    column("momentum_y", "kg m/s"),
-    column("momentum_z", "kg m/s"),
-    column("angular_momentum_x", "kg m²/s"),
-    column("angular_momentum_y", "kg m²/s"),
-    column("angular_momentum_z", "kg m²/s"),
-    column("mass", "kg"),
-    column("grid_mass", "kg"),
-    column("particles", ""),
-    column("put_back", ""),
-    column("deleted", ""),
-    column("deleted_mass", "kg"),
-    column("left", ""),
-    column("left_mass", "kg"),
-];
-
-/// Names and units of the columns after the step. Parts of a job add their own in this order: splits and
-/// merges of dynamic refinement; the work of the shift of fluids; work and heat of artificial viscosity; the
-/// progress towards equilibrium; effort of load steps, and the factor over which the strength is; the number
-/// of the stage, from 1; sources; failed particles; water in the pores; loads; contacts between bodies;
-/// probes; tracks; fluxes; faces of the domain, and the thrust of the water on them; colliders, each with
-/// that on it.
+/// Names and units of the columns behind the step.
 pub fn columns<const D: usize>(problem: &Problem<D>) -> Vec<(String, &'static str)> {
-    let mut columns: Vec<(String, &'static str)> =
-        COLUMNS.iter().map(|column| (column.name.to_owned(), column.unit)).collect();
+    Row::names(|row| add(row, problem, None))
+}
+
+/// Values of a row.
+pub fn values<const D: usize>(problem: &Problem<D>, of: &Totals<'_, D>) -> Vec<f64> {
+    Row::values(|row| add(row, problem, Some(of)))
+}
+
+/// The columns behind the step: those of every job, and those of what a job has.
+fn add<const D: usize>(row: &mut Row, problem: &Problem<D>, of: Option<&Totals<'_, D>>) {
+    let axes = &AXES[..D];
+    of_state(row, of);
     if problem.adaptivity.is_some() {
-        columns.extend(LEDGER.map(|(name, unit)| (name.to_owned(), unit)));
+        of_ledger(row, of.and_then(|of| of.ledger.as_ref()));
     }
     if setup::physics(problem).has_fluids() {
-        columns.push(("shift_work".to_owned(), "J"));
+        row.add(format_args!("shift_work"), "J", of.and_then(|of| of.shift_work));
     }
     if problem.viscosity.is_some() {
-        columns.extend(["viscous_work", "viscous_heat"].map(|name| (name.to_owned(), "J")));
+        let work = of.and_then(|of| of.shock_work);
+        row.vector(format_args!("viscous_"), &["work", "heat"], "J", work);
     }
     if problem.has_equilibrium() {
-        columns.extend(RELAXATION.map(|(name, unit)| (name.to_owned(), unit)));
+        of_relaxation(row, of.map(|of| of.solver));
     }
     if problem.quasi_static.is_some() {
-        columns.extend(EFFORT.map(|name| (name.to_owned(), "")));
+        of_effort(row, of.map(|of| &of.solver.equilibrium.effort));
     }
     if problem.has_reduction() {
-        columns.push(("strength_factor".to_owned(), ""));
+        let factor = |of: &Totals<'_, D>| of.solver.physics.strength_factor(of.solver.clock.time);
+        row.add(format_args!("strength_factor"), "", of.map(factor));
     }
     if problem.stages.len() > 1 {
-        columns.push(("stage".to_owned(), ""));
+        row.add(format_args!("stage"), "", of.map(|of| (of.solver.physics.stage() + 1) as f64));
     }
-    for source in &problem.sources {
-        columns.push((format!("fed_{}", source.name), "kg"));
-        AXES[..D].iter().for_each(|axis| columns.push((format!("fed_{}{axis}", source.name), "kg m/s")));
-        columns.push((format!("fed_energy_{}", source.name), "J"));
+    for (i, source) in problem.sources.iter().enumerate() {
+        let names = [format_args!("fed_{}", source.name), format_args!("fed_energy_{}", source.name)];
+        mass_momentum_energy::<D>(row, names, of.map(|of| &of.sources[i]));
     }
     if problem.materials.iter().any(|material| material.failed != Failed::Stays) {
-        columns.extend(["failed", "failed_mass"].iter().zip(["", "kg"]).map(|(n, u)| ((*n).to_owned(), u)));
-        AXES[..D].iter().for_each(|axis| columns.push((format!("failed{axis}"), "kg m/s")));
-        columns.extend(FAILED_ENERGIES.map(|name| (name.to_owned(), "J")));
+        of_failed::<D>(row, of.and_then(|of| of.failed.as_ref()));
     }
     if problem.output.followed.saturation {
-        columns.push(("pore_water".to_owned(), "kg"));
-        AXES[..D].iter().for_each(|axis| columns.push((format!("pore_water{axis}"), "kg m/s")));
-        columns.push(("pore_water_energy".to_owned(), "J"));
+        let names = [format_args!("pore_water"), format_args!("pore_water_energy")];
+        mass_momentum_energy::<D>(row, names, of.map(|of| &of.pores[0]));
     }
     if let Some(seepage) = &problem.seepage {
         let names = seepage.heads.iter().map(|head| &*head.name).chain(["surface"]);
-        columns.extend(names.map(|name| (format!("flow_{name}"), "m³/s")));
+        for (i, name) in names.enumerate() {
+            row.add(format_args!("flow_{name}"), "m³/s", of.map(|of| of.flows[i][0]));
+        }
     }
-    for load in &problem.loads {
-        AXES[..D].iter().for_each(|axis| columns.push((format!("load_{}{axis}", load.name), "N")));
-        columns.push((format!("work_{}", load.name), "J"));
+    for (i, load) in problem.loads.iter().enumerate() {
+        row.vector(format_args!("load_{}", load.name), axes, "N", of.map(|of| of.loads[i].force));
+        row.add(format_args!("work_{}", load.name), "J", of.map(|of| of.loads[i].work));
     }
-    for (name, two_sides) in &problem.body_contacts.names {
-        let force = AXES[..D].iter().filter(|_| *two_sides);
-        columns.extend(force.map(|axis| (format!("contact_{name}{axis}"), "N")));
-        columns.push((format!("contact_work_{name}"), "J"));
+    for (i, (name, two_sides)) in problem.body_contacts.names.iter().enumerate() {
+        if *two_sides {
+            row.vector(format_args!("contact_{name}"), axes, "N", of.map(|of| of.bodies[i].force));
+        }
+        row.add(format_args!("contact_work_{name}"), "J", of.map(|of| of.bodies[i].work));
     }
-    let probes = problem.probes.iter().map(|probe| (&probe.name, &probe.quantities));
-    let tracks = problem.tracks.iter().map(|track| (&track.name, &track.quantities));
-    for (name, quantities) in probes.chain(tracks) {
-        columns.extend(probe::columns::<D>(quantities, &format!("_{name}")));
+    for (i, probe) in problem.probes.iter().enumerate() {
+        let (suffix, readings) = (format!("_{}", probe.name), of.map(|of| &of.probes[i]));
+        probe.quantities.iter().for_each(|it| it.add_to(row, &suffix, readings, &problem.origin));
     }
-    columns.extend(problem.fluxes.iter().map(|flux| (format!("passed_{}", flux.name), "kg")));
+    for (i, track) in problem.tracks.iter().enumerate() {
+        let (suffix, readings) = (format!("_{}", track.name), of.map(|of| &of.tracks[i]));
+        track.quantities.iter().for_each(|it| it.add_to(row, &suffix, readings, &problem.origin));
+    }
+    for (i, flux) in problem.fluxes.iter().enumerate() {
+        row.add(format_args!("passed_{}", flux.name), "kg", of.map(|of| of.passed[i]));
+    }
+    let faces = axes.iter().flat_map(|axis| ["min", "max"].map(|side| (axis, side))).enumerate();
     if problem.face_forces {
-        for name in &AXES[..D] {
-            for side in ["min", "max"] {
-                columns.extend(AXES[..D].iter().map(|along| (format!("force{name}_{side}{along}"), "N")));
-            }
+        for (i, (axis, side)) in faces.clone() {
+            row.vector(format_args!("force{axis}_{side}"), axes, "N", of.map(|of| of.faces[i]));
         }
     }
-    if problem.face_forces && has_thrust(problem) {
-        for axis in &AXES[..D] {
-            columns.extend(["min", "max"].map(|side| (format!("water{axis}_{side}{axis}"), "N")));
+    let has_thrust = has_thrust(problem);
+    if problem.face_forces && has_thrust {
+        for (i, (axis, side)) in faces {
+            row.add(format_args!("water{axis}_{side}{axis}"), "N", of.map(|of| of.thrust_on_faces[i]));
         }
     }
-    for collider in &problem.colliders {
-        let mut add = |what: &str, axis: &str, unit| {
-            columns.push((format!("{what}_{}{axis}", collider.name), unit));
-        };
-        AXES[..D].iter().for_each(|axis| add("force", axis, "N"));
-        turning_axes::<D>().for_each(|k| add("torque", if D == 2 { "" } else { AXES[k] }, "N m"));
-        if collider.motion != Motion::Fixed {
-            AXES[..D].iter().for_each(|axis| add("position", axis, "m"));
-            if collider.turns_freely() {
-                ["_w", "_x", "_y", "_z"].iter().for_each(|axis| add("orientation", axis, ""));
-            } else {
-                add("angle", "", "rad");
-            }
-            AXES[..D].iter().for_each(|axis| add("velocity", axis, "m/s"));
-            if collider.turns_freely() {
-                AXES.iter().for_each(|axis| add("spin", axis, "rad/s"));
-            } else {
-                add("spin", "", "rad/s");
-            }
-        }
-        if has_thrust(problem) && collider.deforming.is_none() {
-            AXES[..D].iter().for_each(|axis| add("water", axis, "N"));
+    for (i, collider) in problem.colliders.iter().enumerate() {
+        of_collider(row, collider, &problem.origin, of.map(|of| (of, i)));
+        if has_thrust && collider.deforming.is_none() {
+            let thrust = of.map(|of| of.thrust_on_colliders[i]);
+            row.vector(format_args!("water_{}", collider.name), axes, "N", thrust);
         }
     }
-    columns
 }
 
 /// Whether the water presses on colliders and faces with a pressure that the job gives.
@@ -153,124 +165,117 @@ pub fn has_thrust<const D: usize>(problem: &Problem<D>) -> bool {
     problem.loads.iter().any(|load| load.water().is_some_and(given))
 }
 
+/// Columns of every job. Rings do not spin, and the moments of their momenta along the radius cancel.
+fn of_state<const D: usize>(row: &mut Row, of: Option<&Totals<'_, D>>) {
+    let clock = of.map(|of| of.solver.clock);
+    row.add(format_args!("time"), "s", clock.map(|clock| clock.time));
+    row.add(format_args!("dt"), "s", clock.map(|clock| clock.dt));
+    let (particles, grid) = (of.map(|of| &of.particles), of.map(|of| &of.grid));
+    row.add(format_args!("kinetic_energy"), "J", particles.map(|of| of.kinetic));
+    row.add(format_args!("elastic_energy"), "J", particles.map(|of| of.elastic));
+    row.add(format_args!("gravitational_energy"), "J", particles.map(|of| of.gravitational));
+    row.add(format_args!("plastic_work"), "J", particles.map(|of| of.plastic_work));
+    row.vector(format_args!("momentum"), &AXES, "kg m/s", particles.map(|of| of.momentum));
+    let spin = of.map(|of| if is_ring(of) { [0.0; 3] } else { of.grid.angular_momentum });
+    row.vector(format_args!("angular_momentum"), &AXES, "kg m²/s", spin);
+    row.add(format_args!("mass"), "kg", particles.map(|of| of.mass));
+    row.add(format_args!("grid_mass"), "kg", grid.map(|of| of.mass));
+    row.add(format_args!("particles"), "", particles.map(|of| of.count as f64));
+    let crossings = of.map(|of| &of.crossings);
+    let mass = |i: usize| crossings.map(|of| ExactSum::to_f64(&of.masses[i]));
+    row.add(format_args!("put_back"), "", crossings.map(|of| of.put_back as f64));
+    row.add(format_args!("deleted"), "", crossings.map(|of| of.deleted as f64));
+    row.add(format_args!("deleted_mass"), "kg", mass(0));
+    row.add(format_args!("left"), "", crossings.map(|of| of.left as f64));
+    row.add(format_args!("left_mass"), "kg", mass(1));
+}
+
+fn is_ring<const D: usize>(of: &Totals<'_, D>) -> bool {
+    of.solver.physics.coordinates == Coordinates::Axisymmetric
+}
+
 /// Columns of runs with dynamic refinement: sums since the start.
-const LEDGER: [(&str, &str); 5] =
-    [("splits", ""), ("merges", ""), ("merged_away", ""), ("split_energy", "J"), ("merge_energy", "J")];
-
-/// Columns of energies that go with failed particles.
-const FAILED_ENERGIES: [&str; 4] =
-    ["failed_kinetic_energy", "failed_elastic_energy", "failed_gravitational_energy", "failed_plastic_work"];
-
-/// The values of a row for particles that have failed and gone.
-pub fn failed_values<const D: usize>(sums: &[f64; FAILED_SUMS]) -> impl Iterator<Item = f64> {
-    let [deleted, changed, mass, x, y, z, energies @ ..] = *sums;
-    [deleted + changed, mass].into_iter().chain([x, y, z].into_iter().take(D)).chain(energies)
+fn of_ledger(row: &mut Row, of: Option<&LedgerTotals>) {
+    row.add(format_args!("splits"), "", of.map(|of| of.splits as f64));
+    row.add(format_args!("merges"), "", of.map(|of| of.merges as f64));
+    row.add(format_args!("merged_away"), "", of.map(|of| of.removed as f64));
+    row.add(format_args!("split_energy"), "J", of.map(|of| of.split_energy));
+    row.add(format_args!("merge_energy"), "J", of.map(|of| of.merge_energy));
 }
 
-/// Columns of runs towards equilibrium.
-const RELAXATION: [(&str, &str); 3] =
-    [("peak_speed", "m/s"), ("unbalanced_acceleration", "m/s²"), ("stops", "")];
-
-/// The values of a row for the progress towards equilibrium.
-pub fn relaxation_values(relaxation: &Relaxation) -> [f64; RELAXATION.len()] {
-    [relaxation.speed, relaxation.acceleration, relaxation.stops as f64]
+/// Columns of runs towards equilibrium; not a number in stages that do not seek it.
+fn of_relaxation<const D: usize>(row: &mut Row, of: Option<&Solver<D>>) {
+    let of = of.map(|of| of.physics.equilibrium.map(|_| of.equilibrium.relaxation));
+    let number = |get: fn(Relaxation) -> f64| of.map(|of| of.map_or(f64::NAN, get));
+    row.add(format_args!("peak_speed"), "m/s", number(|of| of.speed));
+    row.add(format_args!("unbalanced_acceleration"), "m/s²", number(|of| of.acceleration));
+    row.add(format_args!("stops"), "", number(|of| of.stops as f64));
 }
 
-/// Columns of runs with load steps.
-const EFFORT: [&str; 4] = ["newton_iterations", "linear_iterations", "unbalanced_force", "cuts"];
-
-/// The values of a row for the last load step.
-pub fn effort_values(effort: &Effort) -> [f64; EFFORT.len()] {
-    let Effort { newton, linear, residual, cuts, .. } = *effort;
-    [newton.into(), linear.into(), residual, cuts.into()]
+/// Columns of runs with load steps: the last one.
+fn of_effort(row: &mut Row, of: Option<&Effort>) {
+    row.add(format_args!("newton_iterations"), "", of.map(|of| of.newton.into()));
+    row.add(format_args!("linear_iterations"), "", of.map(|of| of.linear.into()));
+    row.add(format_args!("unbalanced_force"), "", of.map(|of| of.residual));
+    row.add(format_args!("cuts"), "", of.map(|of| of.cuts.into()));
 }
 
-/// The values of a row for splits and merges.
-pub fn ledger_values(ledger: &LedgerTotals) -> [f64; LEDGER.len()] {
-    let count = |n: u64| n as f64;
-    [
-        count(ledger.splits),
-        count(ledger.merges),
-        count(ledger.removed),
-        ledger.split_energy,
-        ledger.merge_energy,
-    ]
+/// Mass, momentum and kinetic energy of what has come, with the names of the first and of the last.
+fn mass_momentum_energy<const D: usize>(
+    row: &mut Row,
+    [name, energy]: [Arguments<'_>; 2],
+    of: Option<&[f64; SOURCE_SUMS]>,
+) {
+    row.add(name, "kg", of.map(|of| of[0]));
+    row.vector(name, &AXES[..D], "kg m/s", of.map(|[_, x, y, z, _]| [*x, *y, *z]));
+    row.add(energy, "J", of.map(|of| of[4]));
 }
 
-const AXES: [&str; 3] = ["_x", "_y", "_z"];
-
-/// Components of a torque: only that about z in 2D.
-fn turning_axes<const D: usize>() -> std::ops::Range<usize> {
-    if D == 2 { 2..3 } else { 0..3 }
+/// Columns of particles that have failed and gone.
+fn of_failed<const D: usize>(row: &mut Row, of: Option<&[f64; FAILED_SUMS]>) {
+    row.add(format_args!("failed"), "", of.map(|[deleted, changed, ..]| deleted + changed));
+    row.add(format_args!("failed_mass"), "kg", of.map(|of| of[2]));
+    row.vector(format_args!("failed"), &AXES[..D], "kg m/s", of.map(|[_, _, _, x, y, z, ..]| [*x, *y, *z]));
+    let ends = ["kinetic_energy", "elastic_energy", "gravitational_energy", "plastic_work"];
+    let energies = of.map(|[_, _, _, _, _, _, energies @ ..]| *energies);
+    row.vector(format_args!("failed_"), &ends, "J", energies);
 }
 
-/// The values of a row, but for those of colliders.
-pub fn row(
-    time: f64,
-    dt: f64,
-    particles: &ParticleTotals,
-    grid: &GridTotals,
-    crossings: &Crossings,
-) -> Vec<f64> {
-    let [deleted_mass, left_mass] = crossings.masses.each_ref().map(ExactSum::to_f64);
-    let [px, py, pz] = particles.momentum;
-    let [lx, ly, lz] = grid.angular_momentum;
-    vec![
-        time,
-        dt,
-        particles.kinetic,
-        particles.elastic,
-        particles.gravitational,
-        particles.plastic_work,
-        px,
-        py,
-        pz,
-        lx,
-        ly,
-        lz,
-        particles.mass,
-        grid.mass,
-        particles.count as f64,
-        crossings.put_back as f64,
-        crossings.deleted as f64,
-        deleted_mass,
-        crossings.left as f64,
-        left_mass,
-    ]
-}
-
-/// The values of a row for one source: mass, momentum and kinetic energy.
-pub fn source_values<const D: usize>(sums: &[f64; SOURCE_SUMS]) -> impl Iterator<Item = f64> {
-    let [mass, x, y, z, energy] = *sums;
-    [mass].into_iter().chain([x, y, z].into_iter().take(D)).chain([energy])
-}
-
-/// The values of a row for one load or contact between bodies: the force, if it has one, and the work.
-pub fn force_and_work<const D: usize>(totals: &ForceAndWork, has_force: bool) -> impl Iterator<Item = f64> {
-    let ForceAndWork { force, work } = *totals;
-    force.into_iter().take(if has_force { D } else { 0 }).chain([work])
-}
-
-/// The values of a row for one collider. `origin` is the lower corner of the domain, m.
-pub fn collider_values<const D: usize>(
+/// Columns of one collider, by its number: force and torque on it, and how it moves. `origin` is the lower corner
+/// of the domain, m.
+fn of_collider<const D: usize>(
+    row: &mut Row,
     collider: &Collider<D>,
-    state: &ColliderState<D>,
-    reaction: &Reaction,
-    origin: &[f64],
-) -> Vec<f64> {
-    let mut values = reaction.force[..D].to_vec();
-    values.extend(&reaction.torque[turning_axes::<D>()]);
-    if collider.motion != Motion::Fixed {
-        let centre = collider.centre(&state.pose);
-        values.extend((0..D).map(|a| origin[a] + centre[a]));
-        let (pose, rate) = (&state.pose, &state.rate);
-        if collider.turns_freely() {
-            values.extend(quaternion(&pose.orientation).into_iter().chain(rate.velocity).chain(rate.turning));
-        } else {
-            values.push(pose.angle);
-            values.extend(rate.velocity);
-            values.push(rate.spin);
-        }
+    origin: &[f64; D],
+    of: Option<(&Totals<'_, D>, usize)>,
+) {
+    let (axes, name) = (&AXES[..D], &collider.name);
+    let reaction = of.map(|(of, i)| &of.reactions[i]);
+    row.vector(format_args!("force_{name}"), axes, "N", reaction.map(|of| of.force));
+    let torque = of.map(|(of, i)| if is_ring(of) { [0.0; 3] } else { of.reactions[i].torque });
+    match D {
+        2 => row.add(format_args!("torque_{name}"), "N m", torque.map(|torque| torque[2])),
+        _ => row.vector(format_args!("torque_{name}"), &AXES, "N m", torque),
     }
-    values
+    if collider.motion == Motion::Fixed {
+        return;
+    }
+    let state = of.map(|(of, i)| &of.solver.contacts.states[i]);
+    let place = |state: &ColliderState<D>| -> [f64; D] {
+        let centre = collider.centre(&state.pose);
+        std::array::from_fn(|a| origin[a] + centre[a])
+    };
+    row.vector(format_args!("position_{name}"), axes, "m", state.map(place));
+    if collider.turns_freely() {
+        let orientation = state.map(|state| quaternion(&state.pose.orientation));
+        row.vector(format_args!("orientation_{name}"), &["_w", "_x", "_y", "_z"], "", orientation);
+    } else {
+        row.add(format_args!("angle_{name}"), "rad", state.map(|state| state.pose.angle));
+    }
+    row.vector(format_args!("velocity_{name}"), axes, "m/s", state.map(|state| state.rate.velocity));
+    if collider.turns_freely() {
+        row.vector(format_args!("spin_{name}"), &AXES, "rad/s", state.map(|state| state.rate.turning));
+    } else {
+        row.add(format_args!("spin_{name}"), "rad/s", state.map(|state| state.rate.spin));
+    }
 }

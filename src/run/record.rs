@@ -13,12 +13,10 @@ use crate::io::log::history::{Column, Gap, History, Kept};
 use crate::io::log::progress::Progress;
 use crate::io::log::telemetry::{Contribution, Record, Resampled, Telemetry};
 use crate::job::Problem;
-use crate::job::problem::Coordinates;
-use crate::probe;
 use crate::probe::line::Sample;
 use crate::solver::diagnostics::thrust::Thrust;
 use crate::solver::diagnostics::totals::{self, GridTotals, ParticleTotals};
-use crate::solver::state::bookings::{FACE_SUMS, FAILED_SUMS, Reaction};
+use crate::solver::state::bookings::{FACE_SUMS, FAILED_SUMS};
 use crate::solver::state::phases::Phase;
 use crate::solver::{Clock, Solver};
 use crate::text::{count, quantity};
@@ -258,85 +256,38 @@ impl<'a, const D: usize> Recorder<'a, D> {
         particles: &ParticleTotals,
         grid: &GridTotals,
     ) -> (Vec<f64>, Vec<Vec<Sample<D>>>) {
-        let clock = solver.clock;
-        let reactions = solver.reactions();
-        let sources = solver.sums.sources.totals(comm);
-        let failed = solver.failed_totals();
-        let pores = solver.sums.pores.totals(comm);
-        let flows = solver.sums.flow.totals(comm);
-        let loads = solver.load_totals();
-        let bodies = solver.body_totals();
-        let readings = solver.read_probes(&self.problem.probes);
-        let tracked = solver.read_tracks(&self.problem.tracks);
+        let problem = self.problem;
+        let probes = solver.read_probes(&problem.probes);
+        let tracks = solver.read_tracks(&problem.tracks);
         let passed = solver.measured.crossings.fluxes.passed(comm, &solver.chunks);
-        let samples = solver.read_lines(&self.problem.lines);
-        solver.note_maps(&self.problem.maps);
-        let faces = solver.face_forces();
-        let crossings = solver.measured.crossings.gather(comm);
-        let ledger = solver.physics.adaptivity.as_ref().map(|_| solver.adaptation.ledger.total(comm));
-        let (shift_work, shock_work) = (solver.shift_work(), solver.shock_work());
-        if self.history.is_none() {
-            return (Vec::new(), samples);
-        }
-        let mut grid = *grid;
-        let is_ring = self.problem.coordinates == Coordinates::Axisymmetric;
-        if is_ring {
-            // Rings do not spin, and the moments of their momenta along the radius cancel.
-            grid.angular_momentum = [0.0; 3];
-        }
-        let mut values = history::row(clock.time, clock.dt, particles, &grid, &crossings);
-        if let Some(ledger) = &ledger {
-            values.extend(history::ledger_values(ledger));
-        }
-        values.extend(shift_work);
-        values.extend(shock_work.into_iter().flatten());
-        if self.problem.has_equilibrium() {
-            let seeks = solver.physics.equilibrium.is_some();
-            values.extend(
-                seeks
-                    .then_some(&solver.equilibrium.relaxation)
-                    .map_or([f64::NAN; 3], history::relaxation_values),
-            );
-        }
-        if self.problem.quasi_static.is_some() {
-            values.extend(history::effort_values(&solver.equilibrium.effort));
-        }
-        if self.problem.has_reduction() {
-            values.push(solver.physics.strength_factor(clock.time));
-        }
-        if self.problem.stages.len() > 1 {
-            values.push((solver.physics.stage() + 1) as f64);
-        }
-        sources.iter().for_each(|sums| values.extend(history::source_values::<D>(sums)));
-        failed.iter().for_each(|sums| values.extend(history::failed_values::<D>(sums)));
-        pores.iter().for_each(|sums| values.extend(history::source_values::<D>(sums)));
-        values.extend(flows.as_flattened());
-        loads.iter().for_each(|load| values.extend(history::force_and_work::<D>(load, true)));
-        for ((_, two_sides), totals) in self.problem.body_contacts.names.iter().zip(&bodies) {
-            values.extend(history::force_and_work::<D>(totals, *two_sides));
-        }
-        let probes = self.problem.probes.iter().map(|probe| &probe.quantities);
-        let tracks = self.problem.tracks.iter().map(|track| &track.quantities);
-        for (quantities, readings) in probes.zip(&readings).chain(tracks.zip(&tracked)) {
-            values.extend(probe::values(quantities, readings, &self.problem.origin));
-        }
-        values.extend(passed);
-        faces.iter().for_each(|force| values.extend(&force[..D]));
-        let thrust = self.thrust.as_ref();
-        values.extend(
-            thrust
-                .filter(|_| self.problem.face_forces)
-                .into_iter()
-                .flat_map(|thrust| thrust.on_faces(solver)),
-        );
-        let all = solver.physics.colliders.iter().zip(&solver.contacts.states).zip(&reactions);
-        let mut of_water = thrust.map_or_else(Vec::new, |thrust| thrust.on_colliders(solver)).into_iter();
-        for ((collider, state), reaction) in all {
-            let reaction = if is_ring { &Reaction { torque: [0.0; 3], ..*reaction } } else { reaction };
-            values.extend(history::collider_values(collider, state, reaction, &self.problem.origin));
-            let own = of_water.next().filter(|_| collider.deforming.is_none());
-            values.extend(own.into_iter().flatten());
-        }
+        let samples = solver.read_lines(&problem.lines);
+        solver.note_maps(&problem.maps);
+        let (solver, thrust) = (&*solver, self.thrust.as_ref());
+        let totals = history::Totals {
+            solver,
+            particles: *particles,
+            grid: *grid,
+            crossings: solver.measured.crossings.gather(comm),
+            ledger: solver.physics.adaptivity.as_ref().map(|_| solver.adaptation.ledger.total(comm)),
+            shift_work: solver.shift_work(),
+            shock_work: solver.shock_work(),
+            sources: solver.sums.sources.totals(comm),
+            failed: solver.failed_totals(),
+            pores: solver.sums.pores.totals(comm),
+            flows: solver.sums.flow.totals(comm),
+            loads: solver.load_totals(),
+            bodies: solver.body_totals(),
+            probes,
+            tracks,
+            passed,
+            faces: solver.face_forces(),
+            thrust_on_faces: thrust
+                .filter(|_| problem.face_forces)
+                .map_or_else(Vec::new, |thrust| thrust.on_faces(solver)),
+            reactions: solver.reactions(),
+            thrust_on_colliders: thrust.map_or_else(Vec::new, |thrust| thrust.on_colliders(solver)),
+        };
+        let values = if self.history.is_some() { history::values(problem, &totals) } else { Vec::new() };
         (values, samples)
     }
 

@@ -6,11 +6,23 @@ use crate::io::log::history::{Column, Gap, History, Kept};
 use crate::job::Problem;
 use crate::probe::Line;
 use crate::probe::line::Sample;
+use crate::row::Row;
 use crate::solver::Clock;
 
 /// The file of a line.
 pub(in crate::run) fn path<const D: usize>(problem: &Problem<D>, line: &Line<D>) -> PathBuf {
     problem.output.directory.join(format!("{}.line_{}.csv", problem.name, line.name))
+}
+
+/// Columns behind the step: time (s), and those of a point with its sample.
+fn add<const D: usize>(
+    row: &mut Row,
+    problem: &Problem<D>,
+    line: &Line<D>,
+    of: Option<(f64, usize, &Sample<D>)>,
+) {
+    row.add(format_args!("time"), "s", of.map(|(time, ..)| time));
+    line.add_to(row, of.map(|(_, point, sample)| (point, sample)), &problem.origin);
 }
 
 /// Not collective. Opens the files of all lines, with the rows that are `kept`, and what is missing there.
@@ -19,9 +31,7 @@ pub(in crate::run) fn open<const D: usize>(
     kept: Option<Kept>,
 ) -> Result<Vec<(History, Vec<Gap>)>, FileError> {
     let open = |line: &Line<D>| {
-        let named = line.columns();
-        let time = [("time".to_owned(), "s")];
-        let named: Vec<_> = time.iter().chain(&named).collect();
+        let named = Row::names(|row| add(row, problem, line, None));
         let columns: Vec<Column<'_>> = named.iter().map(|(name, unit)| Column { name, unit }).collect();
         let path = path(problem, line);
         match kept {
@@ -42,9 +52,8 @@ pub(in crate::run) fn write<const D: usize>(
 ) -> Result<(), FileError> {
     for ((file, line), samples) in files.iter_mut().zip(&problem.lines).zip(samples) {
         for (point, sample) in samples.iter().enumerate() {
-            let mut values = vec![clock.time];
-            values.extend(line.values(point, sample, &problem.origin));
-            file.row(clock.step, &values)?;
+            let of = Some((clock.time, point, sample));
+            file.row(clock.step, &Row::values(|row| add(row, problem, line, of)))?;
         }
     }
     Ok(())
