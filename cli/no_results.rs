@@ -1,5 +1,5 @@
-//! The end of a run in a build without the feature `post`, in place of `results/ended.rs`: no picture, no page,
-//! no hints.
+//! The end of a run in a build without the feature `post`, in place of `results/ended.rs`: no picture, no
+//! page, no hints.
 use std::io::Write;
 use std::path::{Path, PathBuf};
 

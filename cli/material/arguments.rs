@@ -40,8 +40,8 @@ pub struct Arguments {
     #[arg(long, default_value_t = 0.0, requires = "test", allow_negative_numbers = true)]
     pub duration: f64,
 
-    /// Fill the pores with water that cannot leave: after the confinement of --test, or from the start of a path.
-    /// Keys as of `undrained` in a job, for example --undrained='bulk_modulus = 2.2e9, porosity = 0.35'
+    /// Fill the pores with water that cannot leave: after the confinement of --test, or from the start of a
+    /// path. Keys as of `undrained` in a job, for example --undrained='bulk_modulus = 2.2e9, porosity = 0.35'
     /// [default: porosity = 0.4]
     #[arg(long, value_name = "TOML", num_args = 0..=1, require_equals = true, default_missing_value = "porosity = 0.4")]
     pub undrained: Option<String>,

@@ -349,7 +349,8 @@ mod tests {
         );
     }
 
-    /// Clay in an undrained test from beyond its preconsolidation: each row has the tangent of its last substep.
+    /// Clay in an undrained test from beyond its preconsolidation: each row has the tangent of its last
+    /// substep.
     #[test]
     fn tangents_are_columns() {
         let clay = "model = 'cam_clay', shear_modulus = 4e6, critical_stress_ratio = 1.2, compression_index = 0.1, \

@@ -44,8 +44,8 @@ pub struct Arguments {
     /// Fields to export, separated by commas; by default all fields of the files.
     #[arg(long, value_delimiter = ',', value_parser = super::field, conflicts_with_all = ["surface", "htg"])]
     fields: Option<Vec<PointField>>,
-    /// Directory to write to, or of one output the file, with the ending of its format; by default beside each
-    /// file.
+    /// Directory to write to, or of one output the file, with the ending of its format; by default beside
+    /// each file.
     #[arg(long, value_name = "DIR|FILE")]
     out: Option<PathBuf>,
 }

@@ -15,8 +15,8 @@ use post::revolve::Revolve;
 #[derive(Debug, clap::Args)]
 pub(crate) struct Looks {
     /// Quantity that gives the colours: a field of the file or a derived quantity, such as speed, pressure,
-    /// stress_xy, stress_1 (greatest principal stress) or max_shear; by default damage or plastic strain if any
-    /// particle has some, else the speed. An unknown name lists all quantities.
+    /// stress_xy, stress_1 (greatest principal stress) or max_shear; by default damage or plastic strain if
+    /// any particle has some, else the speed. An unknown name lists all quantities.
     #[arg(long, alias = "color")]
     colour: Option<String>,
     /// Value of the first colour; by default the range of the values without the outermost 0.5 % at each end.

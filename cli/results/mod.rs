@@ -1,4 +1,5 @@
-//! Subcommands that draw outputs or write them for others; a build without the feature `post` has none of them.
+//! Subcommands that draw outputs or write them for others; a build without the feature `post` has none of
+//! them.
 //!
 //! | file | task |
 //! |---|---|

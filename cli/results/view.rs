@@ -23,8 +23,8 @@ pub struct Arguments {
     /// Bits for each real value; more bits give finer values and a larger page.
     #[arg(long, default_value_t = 10, value_parser = clap::value_parser!(u8).range(4..=16))]
     bits: u8,
-    /// Bodies of revolution in space (jobs with geometry = "axisymmetric"), with the quarter towards the viewer
-    /// cut out, or whole; without the tree.
+    /// Bodies of revolution in space (jobs with geometry = "axisymmetric"), with the quarter towards the
+    /// viewer cut out, or whole; without the tree.
     #[arg(long, value_name = "open|whole", num_args = 0..=1, require_equals = true, default_missing_value = "open",
         value_parser = str::parse::<Revolve>)]
     revolve: Option<Revolve>,

@@ -5,9 +5,6 @@ use agimp::adaptivity::Adaptivity;
 use agimp::boundary::{ActsOn, Contact, Meets};
 use agimp::job::Problem;
 use agimp::job::problem::{Coordinates, InStages};
-use agimp::load::water::Given;
-use agimp::load::{CarriedForce, Kind as LoadKind, Load};
-use agimp::quantity::Quantity;
 use agimp::setup::known::Known;
 use agimp::setup::{stages, walls};
 use agimp::solver::state::bookings::CarriedTotals;
@@ -110,7 +107,7 @@ pub(crate) fn write<const D: usize>(
         let mut carried = known.carried.iter();
         for (number, load) in problem.loads.iter().enumerate() {
             let stages = in_stages(problem, &problem.load_stages[number]);
-            writeln!(out, "  {:18} {}{stages}", excerpt(&load.name, NAME), load_in_words(load))?;
+            writeln!(out, "  {:18} {}{stages}", excerpt(&load.name, NAME), load.describe())?;
             if let Some(totals) = load.carried().and_then(|_| carried.next()) {
                 writeln!(out, "  {:18} {}", "", carried_in_words::<D>(totals, is_ring, load.from.max(0.0)))?;
             }
@@ -200,8 +197,8 @@ fn write_refinement<const D: usize>(
     writeln!(out, "  that the criteria request.")
 }
 
-/// Names of the bodies that faces and colliders hold at nodes in any stage, since they move with material that
-/// yields, if surfaces let go of anything.
+/// Names of the bodies that faces and colliders hold at nodes in any stage, since they move with material
+/// that yields, if surfaces let go of anything.
 fn held_at_nodes<const D: usize>(problem: &Problem<D>) -> Option<String> {
     let of_colliders = problem.colliders.iter().filter(|collider| collider.acts_on == ActsOn::Nodes);
     let of_colliders = of_colliders.map(|collider| collider.contact);
@@ -270,52 +267,4 @@ fn in_stages<const D: usize>(problem: &Problem<D>, stages: &InStages) -> String 
         let names: Vec<_> = stages.iter().map(|&stage| excerpt(&problem.stages[stage].name, NAME)).collect();
         format!(", in {}", names.join(", "))
     })
-}
-
-/// Kind, value, region and times of a load, in words.
-fn load_in_words<const D: usize>(load: &Load<D>) -> String {
-    let value = |quantity: &Quantity, unit: &str| match quantity {
-        Quantity::Constant(value) => self::quantity(*value, unit),
-        Quantity::Expression(_) => format!("an expression in {unit}"),
-        Quantity::Table(_) => format!("a table in {unit}"),
-        Quantity::Field(_) => format!("values from a file in {unit}"),
-    };
-    let axes = ["x", "y", "z"];
-    let what = match &load.kind {
-        LoadKind::BodyForce(components) => {
-            let components: Vec<String> = components.iter().map(|c| value(c, "m/s²")).collect();
-            format!("body force ({})", components.join(", "))
-        }
-        LoadKind::Velocity(components) => {
-            let given = components.iter().zip(axes).filter_map(|(c, axis)| Some((c.as_ref()?, axis)));
-            let given: Vec<String> = given.map(|(c, axis)| format!("{axis}: {}", value(c, "m/s"))).collect();
-            format!("velocity {}", given.join(", "))
-        }
-        LoadKind::Water(water) => match &water.given {
-            Given::Level(level) => format!("water table at {}", value(level, "m")),
-            Given::Pressure(pressure) => format!("pore pressure {}", value(pressure, "Pa")),
-            Given::Seepage(_) => "steady seepage".to_owned(),
-        },
-        LoadKind::LocalDamping(factor) => format!("local damping {factor}"),
-        LoadKind::Damping(rate) => format!("damping {}", value(rate, "1/s")),
-        LoadKind::Carried(carried) => {
-            let vector = |components: &[Quantity; D], unit: &str| {
-                components.each_ref().map(|c| value(c, unit)).join(", ")
-            };
-            match &carried.force {
-                CarriedForce::Traction(components) => format!("traction ({})", vector(components, "Pa")),
-                CarriedForce::Pressure { pressure, follows } => {
-                    let surface = if *follows { "deformed" } else { "undeformed" };
-                    format!("pressure {} on the {surface} surface", value(pressure, "Pa"))
-                }
-                CarriedForce::Point { force, .. } => format!("point force ({})", vector(force, "N")),
-            }
-        }
-    };
-    let place = if load.region.is_some() { "in a region" } else { "everywhere" };
-    match (load.from > 0.0, load.until.is_finite()) {
-        (false, false) => format!("{what}, {place}, always"),
-        (_, false) => format!("{what}, {place}, from {} on", quantity(load.from, "s")),
-        _ => format!("{what}, {place}, from {} to {}", quantity(load.from, "s"), quantity(load.until, "s")),
-    }
 }

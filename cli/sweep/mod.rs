@@ -2,8 +2,8 @@
 //!
 //! Each run is a process of its own (`agimp run`, by default alone, or started by a launcher such as
 //! `mpirun -n 4`) with a directory of its own. A run that has its report is finished and not done again, so
-//! that the same command goes on after an interruption, and other values join those that are there. Results of
-//! another job are replaced only on request.
+//! that the same command goes on after an interruption, and other values join those that are there. Results
+//! of another job are replaced only on request.
 //!
 //! | file | content |
 //! |---|---|
@@ -216,7 +216,8 @@ fn order(values: &[String]) -> Vec<(bool, f64, &str)> {
         .collect()
 }
 
-/// Name of the directory of a run: its settings. Where a name cannot have them, their checksum keeps it apart.
+/// Name of the directory of a run: its settings. Where a name cannot have them, their checksum keeps it
+/// apart.
 fn directory(over: &[(String, Vec<String>)], values: &[String]) -> String {
     let mut whole = String::new();
     for ((key, _), value) in over.iter().zip(values) {

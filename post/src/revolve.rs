@@ -1,4 +1,5 @@
-//! Bodies of revolution in space: copies of the particles of the half plane next to each other about the axis.
+//! Bodies of revolution in space: copies of the particles of the half plane next to each other about the
+//! axis.
 //!
 //! Radius and height, x and y of an axisymmetric job, become the distance from the z axis and z.
 use std::f64::consts::{PI, TAU};
@@ -38,8 +39,8 @@ impl Revolve {
         if self == Self::Open { 1.5 * PI } else { TAU }
     }
 
-    /// Signed distance of a place from where bodies are, as far as the open quarter goes, m, or a bound smaller
-    /// in magnitude.
+    /// Signed distance of a place from where bodies are, as far as the open quarter goes, m, or a bound
+    /// smaller in magnitude.
     pub(super) fn distance(self, x: &[f64; 3]) -> f64 {
         if self == Self::Open { x[0].min(-x[1]) } else { f64::NEG_INFINITY }
     }
@@ -84,8 +85,8 @@ impl Turn {
     }
 }
 
-/// The copies of the particles of a file, given by radius and half width (m): the number of each particle, and
-/// its turn.
+/// The copies of the particles of a file, given by radius and half width (m): the number of each particle,
+/// and its turn.
 ///
 /// # Errors
 /// In words: the file is of another geometry, or has too many copies.

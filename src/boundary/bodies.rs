@@ -107,8 +107,8 @@ pub fn gap_between([first, second]: [f64; 2]) -> f64 {
     place_of_surface(1.0 - second) - place_of_surface(first)
 }
 
-/// Weight of the surface at a node in the smoothed normal, from 0 to 1, with this gap in cells. Where bodies do
-/// not touch, beside the edges of a block on a slab, surfaces at the node are not those of the contact.
+/// Weight of the surface at a node in the smoothed normal, from 0 to 1, with this gap in cells. Where bodies
+/// do not touch, beside the edges of a block on a slab, surfaces at the node are not those of the contact.
 pub fn part_in_normals(gap: f64) -> f64 {
     (1.0 - gap / NEAR).clamp(0.0, 1.0)
 }

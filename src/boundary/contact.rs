@@ -95,8 +95,8 @@ impl Contact {
         matches!(self, Self::Sticky | Self::Slip | Self::Separating { .. })
     }
 
-    /// Bounds that it sets across a gap (m) to material between nodes with cells of this edge (m), in a step of
-    /// length `dt`, s.
+    /// Bounds that it sets across a gap (m) to material between nodes with cells of this edge (m), in a step
+    /// of length `dt`, s.
     pub fn across(self, gap: f64, cell: f64, dt: f64) -> Bounds {
         Bounds::across(gap, cell, dt, matches!(self, Self::Sticky | Self::Slip))
     }

@@ -41,9 +41,9 @@ pub fn slope<const D: usize>(gradient: &[f64; 4], normal: &[f64; D]) -> f64 {
     -(0..D).fold(0.0, |sum, a| gradient[a].mul_add(normal[a], sum))
 }
 
-/// Plastic strain, or damage, from which on material counts as yielded: its boxes no longer tile, and the height
-/// that it has over nodes has errors of a tenth of a cell and more. Over such gaps the foot of a plastic rod
-/// that strikes a face would spread too little.
+/// Plastic strain, or damage, from which on material counts as yielded: its boxes no longer tile, and the
+/// height that it has over nodes has errors of a tenth of a cell and more. Over such gaps the foot of a
+/// plastic rod that strikes a face would spread too little.
 const YIELDED: f64 = 0.02;
 
 /// Size over slope from which on material that has yielded is all there is.
@@ -85,7 +85,8 @@ impl Meets {
         matches!(self, Self::Firm | Self::Frictional)
     }
 
-    /// Of two materials that move together: later ones go before earlier ones, but for fluids with what yields.
+    /// Of two materials that move together: later ones go before earlier ones, but for fluids with what
+    /// yields.
     pub fn together(self, other: Self) -> Self {
         match [self.min(other), self.max(other)] {
             [Self::Firm | Self::Frictional, Self::Feet] => Self::Nodes,
@@ -94,7 +95,7 @@ impl Meets {
     }
 }
 
-/// What a surface asks of the velocity of material at it in a step.
+/// Condition of a surface on the velocity of material at it in a step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Bounds {
     /// Least velocity along the normal, relative to the surface, m/s: that which closes the gap in the step.

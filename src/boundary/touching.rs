@@ -37,7 +37,7 @@ pub struct Touching<const D: usize> {
     /// Bounds on the velocity along the normal relative to it; the greatest is finite where the surface pulls
     /// as well.
     pub bounds: Bounds,
-    /// What happens to material there.
+    /// Law of contact there.
     pub law: Contact,
     /// Impulse along the surface that cohesion bears at most, kg m/s.
     pub sticking: f64,
@@ -56,8 +56,8 @@ pub fn touching_distance<const D: usize>(half: &[f64; D], normal: &[f64; D]) -> 
 }
 
 impl<const D: usize> Touching<D> {
-    /// A particle with its centre at `x` (m), of these half widths (m) and this density (kg/m³, for drag), in a
-    /// step of these lengths. `None` if the gap to the surface is wider than `reach`, m, a function of the
+    /// A particle with its centre at `x` (m), of these half widths (m) and this density (kg/m³, for drag), in
+    /// a step of these lengths. `None` if the gap to the surface is wider than `reach`, m, a function of the
     /// normal, the velocity of the surface and the distance at which the particle touches.
     pub fn new(
         number: usize,

@@ -114,7 +114,7 @@ pub enum Shape {
         #[serde(default = "one")]
         #[schemars(range(max = 1e9), extend("exclusiveMinimum" = 0.0))]
         scale: f64,
-        /// What is inside: `closed` by default.
+        /// Rule that tells the inside: `closed` by default.
         #[serde(default)]
         solid: Solid,
         /// Where the origin of the file lies, m; the origin of the job by default.
@@ -185,22 +185,23 @@ pub enum Shape {
     },
     /// Points of a shape that lie in none of those removed.
     Difference {
-        /// What is left over is part of this shape.
+        /// The shape of which a rest is left.
         from: Box<Shape>,
         /// Shapes removed; at least one.
         remove: Vec<Shape>,
     },
 }
 
-/// What is inside of a mesh.
+/// Rule that tells the inside of a mesh.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Solid {
-    /// What the surface encloses: it is closed, its triangles face one way, and it does not cross itself.
+    /// Inside is the space that the surface encloses: it is closed, its triangles face one way, and it does
+    /// not cross itself.
     #[default]
     Closed,
-    /// What the surface winds around: holes are closed by cones over their rims, overlaps are filled, and
-    /// triangles may face either way.
+    /// Inside is the space that the surface winds around: holes are closed by cones over their rims, overlaps
+    /// are filled, and triangles may face either way.
     Winding,
 }
 

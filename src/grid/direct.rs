@@ -153,8 +153,8 @@ fn intervals(leaf: u32, cell: f64, centre: f64, half: f64, is_radius: bool) -> V
             let (low, high) = ((middle - half).max(0.0), (middle + half).min(cell));
             (high > low).then(|| {
                 let share = (high - low) / (2.0 * half);
-                // Distance of the middle of the share from the lower and from the upper corner, in cells. Each
-                // is computed on its own, so that a small one keeps its digits.
+                // Distance of the middle of the share from the lower and from the upper corner, in cells.
+                // Each is computed on its own, so that a small one keeps its digits.
                 let middle = [0.5 * (low + high) / cell, 0.5 * ((cell - low) + (cell - high)) / cell];
                 // The radius of the middle, and what the slope of a hat adds to its mean: width² / 12.
                 let (radius, bend) = match is_radius {

@@ -267,11 +267,11 @@ pub(super) fn whole_of_batch<V: Vector, const D: usize>(
     half
 }
 
-/// Half widths of sections of rings: of a square section with the undeformed volume at the present radius, times
-/// the stretches that keep the volume. As the stretch along the hoop is the ratio of the radii, the half width
-/// along the radius of an elastic particle is `√(V₀ / (2π r)) / 2 · √λ_θ λ_r`, and the section of any has the
-/// area `J V₀ / (2π r)`. At most half a cell of the particle's level: towards the axis sections grow without
-/// bound.
+/// Half widths of sections of rings: of a square section with the undeformed volume at the present radius,
+/// times the stretches that keep the volume. As the stretch along the hoop is the ratio of the radii, the
+/// half width along the radius of an elastic particle is `√(V₀ / (2π r)) / 2 · √λ_θ λ_r`, and the
+/// section of any has the area `J V₀ / (2π r)`. At most half a cell of the particle's level: towards the
+/// axis sections grow without bound.
 #[inline(never)]
 fn of_rings<const D: usize>(
     tile: &[[f64; LANES]],

@@ -139,8 +139,8 @@ pub enum Coordinates {
 }
 
 impl Coordinates {
-    /// Length over which a point with this first coordinate (m) stands: the circumference of its circle, m, in
-    /// axisymmetry; else 1.
+    /// Length over which a point with this first coordinate (m) stands: the circumference of its circle, m,
+    /// in axisymmetry; else 1.
     pub fn around(self, x: f64) -> f64 {
         match self {
             Self::Cartesian => 1.0,
@@ -167,7 +167,8 @@ impl Coordinates {
     }
 
     /// Distance (m) along the first axis from the centre of a box with this half width (m) at `x` to its
-    /// centre of mass: `∫ r² dr / ∫ r dr - x`. A box that reaches beyond the axis counts as one that touches it.
+    /// centre of mass: `∫ r² dr / ∫ r dr - x`. A box that reaches beyond the axis counts as one that
+    /// touches it.
     pub fn to_mass_centre(self, half: f64, x: f64) -> f64 {
         match self {
             Self::Cartesian => 0.0,

@@ -17,8 +17,8 @@
 //! With [`Scheme::forces`] the particles' affine columns hold a stress that need not be symmetric, in place
 //! of τ, and there is no affine momentum.
 //!
-//! In axisymmetry the hoop stress adds `-Δt V₀ τ_θθ T` to the momentum along the radius, with T the plain mean
-//! of the hat over the box, over the radius; it has a pass of its own.
+//! In axisymmetry the hoop stress adds `-Δt V₀ τ_θθ T` to the momentum along the radius, with T the plain
+//! mean of the hat over the box, over the radius; it has a pass of its own.
 use super::batch::{Batch, Batches, Tile, lanes_in};
 use super::constrained_nodes::ConstrainedNodes;
 use super::hanging::HangingNodes;

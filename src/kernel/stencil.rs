@@ -92,8 +92,8 @@ impl<V: Vector> Axis<V> {
     }
 
     /// As [`Axis::new`] along the radius of an axisymmetric domain, for a particle at `radius`, m: weights
-    /// `∫ N r dr` and slopes `∫ N' r dr`, each over the radius and the width of the box. `corner` is the radius of
-    /// the block's corner, m.
+    /// `∫ N r dr` and slopes `∫ N' r dr`, each over the radius and the width of the box. `corner` is
+    /// the radius of the block's corner, m.
     #[inline(always)]
     pub fn revolved(centre: V, half: V, cell: f64, corner: f64, radius: V) -> Self {
         let parts = Parts::new(centre, half);
@@ -200,9 +200,9 @@ mod tests {
         assert!(reached > 4000, "{reached}");
     }
 
-    /// Weights of rings add up to 1 and are not negative, linear fields are met at the centre of mass, a uniform
-    /// expansion has the same rate along the radius and along the hoop, and next to an overlap weights are its
-    /// square.
+    /// Weights of rings add up to 1 and are not negative, linear fields are met at the centre of mass, a
+    /// uniform expansion has the same rate along the radius and along the hoop, and next to an overlap
+    /// weights are its square.
     #[test]
     fn rings_are_weighted_by_their_radius() {
         let cell = 0.125;

@@ -26,7 +26,7 @@ pub(super) struct Weights<const D: usize> {
     pub product: [[[f64; LANES]; 3]; 3],
     /// `Σ w (node - particle)²` along each axis.
     pub spread: [[f64; LANES]; D],
-    /// What axisymmetry needs more, if `is_ring`.
+    /// Further factors in axisymmetry, if `is_ring`.
     pub ring: Ring,
     pub is_ring: bool,
 }
@@ -35,7 +35,7 @@ pub(super) struct Weights<const D: usize> {
 pub(super) struct Ring {
     /// Weights along the radius of plain means over the box, `∫ N dr / ∫ dr`.
     pub plain: [[f64; LANES]; 3],
-    /// What makes plain means of the radial velocity rates of the hoop: 1 / radius, 1/m.
+    /// Factor that makes rates of the hoop of plain means of the radial velocity: 1 / radius, 1/m.
     pub hoop: [f64; LANES],
 }
 
@@ -132,8 +132,8 @@ impl<const D: usize> Weights<D> {
     }
 
     /// Replaces the factors along the first axis by those of axisymmetry (see [`Axis::revolved`]), for
-    /// particles at `radius` whose boxes, or parts of boxes, are these; `whole` is the half width of the whole
-    /// box. Arms are relative to the centre of mass of the whole box, to which the velocity belongs.
+    /// particles at `radius` whose boxes, or parts of boxes, are these; `whole` is the half width of the
+    /// whole box. Arms are relative to the centre of mass of the whole box, to which the velocity belongs.
     /// Out of line: planar kernels have one branch for it, and no registers.
     #[inline(never)]
     fn revolve(&mut self, frame: &Frame<D>, radius: Lanes, centre: Lanes, half: Lanes, whole: Lanes) {

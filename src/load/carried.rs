@@ -3,6 +3,7 @@
 //! At the start each particle at a surface gets the area that it stands for, and each particle of a point
 //! force its share. These numbers move with the particles, are shared among children and add up in merges, so
 //! that the total force is that of the definition at all times.
+use super::words::{all_in_words, in_words};
 use crate::quantity::Quantity;
 
 /// A force that particles carry.
@@ -56,6 +57,18 @@ impl<const D: usize> CarriedForce<D> {
         match self {
             Self::Traction(components) | Self::Point { force: components, .. } => components.iter().collect(),
             Self::Pressure { pressure, .. } => vec![pressure],
+        }
+    }
+
+    /// Kind and value, in words.
+    pub fn describe(&self) -> String {
+        match self {
+            Self::Traction(components) => format!("traction ({})", all_in_words(components, "Pa")),
+            Self::Pressure { pressure, follows } => {
+                let surface = if *follows { "deformed" } else { "undeformed" };
+                format!("pressure {} on the {surface} surface", in_words(pressure, "Pa"))
+            }
+            Self::Point { force, .. } => format!("point force ({})", all_in_words(force, "N")),
         }
     }
 

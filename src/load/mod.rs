@@ -12,19 +12,23 @@
 //! | `carried.rs` | forces that particles carry: tractions, pressures, point forces |
 //! | `water.rs` | pressure of the water in the pores |
 //! | `seepage.rs` | heads between which water flows |
+//! | `words.rs` | quantities in words |
 mod carried;
 mod gravity;
 pub mod seepage;
 pub mod water;
+mod words;
 
 pub use carried::{Carried, CarriedForce, cofactor};
 pub use gravity::{Gravity, Up};
 pub use seepage::Seepage;
 pub use water::Water;
 
+use self::words::{all_in_words, in_words};
 use crate::geometry::Shape;
 use crate::leapfrog::Lengths;
 use crate::quantity::{Place, Quantity, in_job};
+use crate::text::quantity;
 
 /// Number of columns that particles carry for some loads.
 pub fn columns<const D: usize>(loads: &[Load<D>]) -> usize {
@@ -87,7 +91,7 @@ impl<const D: usize> Load<D> {
             Kind::BodyForce(acceleration) => {
                 are_masses_scaled || acceleration.iter().any(Quantity::names_undeformed)
             }
-            Kind::Velocity(_) | Kind::Damping(_) | Kind::LocalDamping(_) => false,
+            _ => false,
         }
     }
 
@@ -96,7 +100,7 @@ impl<const D: usize> Load<D> {
         match &self.kind {
             Kind::BodyForce(acceleration) => acceleration.iter().any(Quantity::names_undeformed),
             Kind::Carried(carried) => carried.force.names_undeformed(),
-            Kind::Velocity(_) | Kind::Damping(_) | Kind::LocalDamping(_) | Kind::Water(_) => false,
+            _ => false,
         }
     }
 
@@ -106,9 +110,33 @@ impl<const D: usize> Load<D> {
             Kind::BodyForce(acceleration) => acceleration.iter().collect(),
             Kind::Velocity(prescribed) => prescribed.iter().flatten().collect(),
             Kind::Damping(rate) => vec![rate],
-            Kind::LocalDamping(_) => Vec::new(),
             Kind::Carried(carried) => carried.force.quantities(),
             Kind::Water(water) => water.quantity().into_iter().collect(),
+            Kind::LocalDamping(_) => Vec::new(),
+        }
+    }
+
+    /// Kind, value, region and times, in words.
+    pub fn describe(&self) -> String {
+        let kind = match &self.kind {
+            Kind::BodyForce(components) => format!("body force ({})", all_in_words(components, "m/s²")),
+            Kind::Velocity(components) => {
+                let given = components.iter().zip(["x", "y", "z"]);
+                let given =
+                    given.filter_map(|(c, axis)| Some(format!("{axis}: {}", in_words(c.as_ref()?, "m/s"))));
+                format!("velocity {}", given.collect::<Vec<_>>().join(", "))
+            }
+            Kind::Damping(rate) => format!("damping {}", in_words(rate, "1/s")),
+            Kind::Carried(carried) => carried.force.describe(),
+            Kind::Water(water) => water.describe(),
+            Kind::LocalDamping(factor) => format!("local damping {factor}"),
+        };
+        let place = if self.region.is_some() { "in a region" } else { "everywhere" };
+        let [from, until] = [self.from, self.until].map(|time| quantity(time, "s"));
+        match (self.from > 0.0, self.until.is_finite()) {
+            (false, false) => format!("{kind}, {place}, always"),
+            (_, false) => format!("{kind}, {place}, from {from} on"),
+            _ => format!("{kind}, {place}, from {from} to {until}"),
         }
     }
 
@@ -162,7 +190,6 @@ impl<const D: usize> Load<D> {
         let (place, start, kick) = (in_job(&self.origin, x), start - self.start, lengths.kick);
         let of_forces = lengths.middle_of_kick(start);
         match &self.kind {
-            Kind::Carried(_) | Kind::LocalDamping(_) | Kind::Water(_) => {}
             Kind::BodyForce(acceleration) => {
                 for axis in 0..D {
                     velocity[axis] = kick.mul_add(acceleration[axis].at(place, of_forces), velocity[axis]);
@@ -180,6 +207,7 @@ impl<const D: usize> Load<D> {
                 let kept = libm::exp(-rate.at(place, of_forces) * kick);
                 velocity.iter_mut().for_each(|v| *v *= kept);
             }
+            Kind::Carried(_) | Kind::LocalDamping(_) | Kind::Water(_) => {}
         }
     }
 

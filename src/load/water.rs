@@ -3,17 +3,18 @@
 //! Laws see the effective stress. Water with the pressure p in pores that are connected moves the material by
 //! the divergence of its part `-p I` of the total stress, and free water by the pressure `-p n` on the
 //! surfaces that it wets. Together they do the work of a force per volume,
-//! `∫ p ∇N dV - ∮ N p n dA = -∫ N ∇p dV`,
-//! so no surface needs to be known, water above the ground loads it, and a submerged body is buoyant. The mean
-//! of ∇p over a box is the difference of p between its faces over its width, also where the water table
-//! passes through the box. So material whose weight the water bears is at rest to round-off.
+//! `∫ p ∇N dV - ∮ N p n dA = -∫ N ∇p dV`, so no surface needs to be known, water above the
+//! ground loads it, and a submerged body is buoyant. The mean of ∇p over a box is the difference of p between
+//! its faces over its width, also where the water table passes through the box. So material whose weight the
+//! water bears is at rest to round-off.
 //!
-//! The volume is that of the mass at the density of the material: it has the water of these pores. Water that comes
-//! as they open, and goes as they close, bears its own weight. So grains that the flow has parted sink with
-//! the weight that they have under water, whatever the space between them.
+//! The volume is that of the mass at the density of the material: it has the water of these pores. Water that
+//! comes as they open, and goes as they close, bears its own weight. So grains that the flow has parted sink
+//! with the weight that they have under water, whatever the space between them.
 use std::borrow::Cow;
 
 use super::Up;
+use super::words::in_words;
 use crate::quantity::Quantity;
 
 /// Water in the pores of all material.
@@ -36,7 +37,8 @@ pub enum Given {
     Level(Quantity),
     /// The pressure itself, Pa.
     Pressure(Quantity),
-    /// Steady seepage: the head about a particle, which carries it; nothing where no water has been found yet.
+    /// Steady seepage: the head about a particle, which carries it; nothing where no water has been found
+    /// yet.
     Seepage(Option<Head>),
 }
 
@@ -60,7 +62,16 @@ impl Head {
 }
 
 impl Water {
-    /// What it depends on, if the job gives that.
+    /// Origin of the pressure, in words.
+    pub fn describe(&self) -> String {
+        match &self.given {
+            Given::Level(level) => format!("water table at {}", in_words(level, "m")),
+            Given::Pressure(pressure) => format!("pore pressure {}", in_words(pressure, "Pa")),
+            Given::Seepage(_) => "steady seepage".to_owned(),
+        }
+    }
+
+    /// The quantity that gives it, if the job has one.
     pub fn quantity(&self) -> Option<&Quantity> {
         match &self.given {
             Given::Level(quantity) | Given::Pressure(quantity) => Some(quantity),

@@ -1,15 +1,16 @@
 //! Water that cannot leave the pores: a law in which it bears a share of the stress.
 //!
-//! The law of the model sees the effective stress σ'. Water with the bulk modulus K in pores of the porosity n
-//! has the excess pressure `u = -(K/n) ln J_c`, with the volume ratio J_c since the ground was consolidated: since
-//! the start, or under the initial stress of its body. The total stress is `σ = σ' - u I`, so
+//! The law of the model sees the effective stress σ'. Water with the bulk modulus K in pores of the porosity
+//! n has the excess pressure `u = -(K/n) ln J_c`, with the volume ratio J_c since the ground was
+//! consolidated: since the start, or under the initial stress of its body. The total stress is
+//! `σ = σ' - u I`, so
 //! ```text
 //! τ = τ' + (K/n) J ln(J_c) I,   W = W' + (K/n) J/J_c (J_c ln J_c - J_c + 1)
 //! ```
 //! and along any direction `s² ∂P/∂F` gains `(K/n) J`: `ρ₀ c² = ρ₀ c'² + (K/n) J`.
 //!
-//! The logarithm of the volume ratio is that of the elastic state and of the plastic volume in the history; its
-//! value at consolidation is the history variable that the model leaves free.
+//! The logarithm of the volume ratio is that of the elastic state and of the plastic volume in the history;
+//! its value at consolidation is the history variable that the model leaves free.
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -121,7 +122,8 @@ fn volume_log(state: &State) -> Lanes {
     ln(determinant(&state.elastic)).mul_add(Lanes::splat(0.5), state.history[PLASTIC_VOLUME])
 }
 
-/// Lets the water of a particle flow until its pressure has no excess: consolidation in the state that it has.
+/// Lets the water of a particle flow until its pressure has no excess: consolidation in the state that it
+/// has.
 pub fn consolidate(elastic: &[f64; 6], history: &mut [f64; HISTORIES]) {
     let mut state = State::new(elastic.map(Lanes::splat));
     state.history = history.map(Lanes::splat);
@@ -133,8 +135,8 @@ pub(super) fn consolidate_as(other: &[f64; HISTORIES], history: &mut [f64; HISTO
     history[CONSOLIDATED] = other[CONSOLIDATED];
 }
 
-/// Excess pore pressure u, Pa, of a particle with this elastic tensor and history, and the stiffness K/n of the
-/// water, Pa.
+/// Excess pore pressure u, Pa, of a particle with this elastic tensor and history, and the stiffness K/n of
+/// the water, Pa.
 pub fn excess_pressure(modulus: f64, elastic: &[f64; 6], history: &[f64; HISTORIES]) -> f64 {
     let mut state = State::new(elastic.map(Lanes::splat));
     state.history = history.map(Lanes::splat);

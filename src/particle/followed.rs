@@ -77,9 +77,9 @@ impl Followed {
     }
 }
 
-/// The head about a particle of a chunk whose columns for it begin with `first`: value `c` at the lower corner
-/// of the domain (at `origin` in the job, m), and gradient g, so that it is `c + g x` wherever the particle
-/// goes, and halves of it have the same. `None` where the chunk does not carry it.
+/// The head about a particle of a chunk whose columns for it begin with `first`: value `c` at the lower
+/// corner of the domain (at `origin` in the job, m), and gradient g, so that it is `c + g x` wherever the
+/// particle goes, and halves of it have the same. `None` where the chunk does not carry it.
 pub fn head<const D: usize>(
     chunk: &Chunk<D>,
     first: Option<usize>,

@@ -6,8 +6,9 @@ use crate::load::Water;
 use crate::material::undrained;
 use crate::quantity::in_job;
 
-/// Pressure (Pa) of the water that a job gives, at a time (s) of its own and in this gravity (m/s²). Particles
-/// carry its head from column `first` on where it seeps; `origin` is the lower corner of the domain, m.
+/// Pressure (Pa) of the water that a job gives, at a time (s) of its own and in this gravity (m/s²).
+/// Particles carry its head from column `first` on where it seeps; `origin` is the lower corner of the
+/// domain, m.
 pub fn given_pressure<const D: usize>(
     water: &Water,
     time: f64,

@@ -18,7 +18,7 @@ pub struct Line<const D: usize> {
     pub quantities: Vec<Sampled>,
 }
 
-/// What a line shows at a point. Means are not a number where there is no material.
+/// Quantities of lines. Means are not a number where there is no material.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Sampled {

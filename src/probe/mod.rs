@@ -43,7 +43,7 @@ impl<const D: usize> Probe<D> {
     }
 }
 
-/// What a probe measures. Means are not a number while there is no material.
+/// Quantities of probes. Means are not a number while there is no material.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Measured {
@@ -71,7 +71,8 @@ pub enum Measured {
     Pressure,
     /// Mean plastic strain by volume.
     PlasticStrain,
-    /// Mean pressure of the water in the pores by volume, Pa: of the water table, of seepage, and the excess in undrained ground.
+    /// Mean pressure of the water in the pores by volume, Pa: of the water table, of seepage, and the excess
+    /// in undrained ground.
     PorePressure,
     /// Least and greatest coordinates of particles along each axis, m.
     Extent,

@@ -241,8 +241,8 @@ fn of_failed<const D: usize>(row: &mut Row, of: Option<&[f64; FAILED_SUMS]>) {
     row.vector(format_args!("failed_"), &ends, "J", energies);
 }
 
-/// Columns of one collider, by its number: force and torque on it, and how it moves. `origin` is the lower corner
-/// of the domain, m.
+/// Columns of one collider, by its number: force and torque on it, and how it moves. `origin` is the lower
+/// corner of the domain, m.
 fn of_collider<const D: usize>(
     row: &mut Row,
     collider: &Collider<D>,

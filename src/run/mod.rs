@@ -55,8 +55,8 @@ use crate::text::{count, quantity};
 /// on to a first step, whose checkpoint a queue can continue from.
 const LONG_START: Duration = Duration::from_secs(5);
 
-/// Collective. Runs a job to its end, or until it is asked to stop. `pictures` draws its last state if the job
-/// wants a picture of it. Not generic, so that a program does not compile the solver anew.
+/// Collective. Runs a job to its end, or until it is asked to stop. `pictures` draws its last state if the
+/// job wants a picture of it. Not generic, so that a program does not compile the solver anew.
 ///
 /// # Errors
 /// The same on all ranks.

@@ -2,8 +2,8 @@
 //!
 //! Stress is that at the centre of a particle's box. Where boxes tile the ground and stress is linear along
 //! the vertical, this is its mean over each box, and the sums at the nodes are those of the exact integrals:
-//! level ground is at rest to round-off. Stress is effective: water in the pores bears its part of the weight.
-//! Where it seeps, its pressure is known when heads have been found, so that stress comes after them.
+//! level ground is at rest to round-off. Stress is effective: water in the pores bears its part of the
+//! weight. Where it seeps, its pressure is known when heads have been found, so that stress comes after them.
 use std::borrow::Cow;
 
 use partition::Octant;
@@ -115,8 +115,8 @@ fn fault<const D: usize>(
     }
 }
 
-/// State of a particle of a body at a point, with a box of this half width, m; `about` is the head there where
-/// water seeps.
+/// State of a particle of a body at a point, with a box of this half width, m; `about` is the head there
+/// where water seeps.
 fn at<const D: usize>(
     problem: &Problem<D>,
     body: &Body<D>,
@@ -145,8 +145,8 @@ fn at<const D: usize>(
             });
             let is_below =
                 |x: &[f64; D]| water.as_ref().is_some_and(|water| water.is_below(problem.place(x), 0.0));
-            // Where the water table passes through a box, the particle has the mean density of both parts, and
-            // the stress at its centre is the mean of those at its faces.
+            // Where the water table passes through a box, the particle has the mean density of both parts,
+            // and the stress at its centre is the mean of those at its faces.
             let vertical = match is_below(&faces[0]) == is_below(&faces[1]) {
                 true => weight(x),
                 false => 0.5 * (weight(&faces[0]) + weight(&faces[1])),
@@ -229,14 +229,14 @@ fn interpolate(rows: &[[f64; 3]], depth: f64) -> [f64; 2] {
     [1, 2].map(|value| share.mul_add(high[value] - low[value], low[value]))
 }
 
-/// Material on a vertical line: pieces of bodies with their material, and the heights (m, up) where they begin
-/// and end.
+/// Material on a vertical line: pieces of bodies with their material, and the heights (m, up) where they
+/// begin and end.
 #[derive(Clone, Debug, Default)]
 struct Standing(Vec<(usize, [f64; 2])>);
 
 impl Standing {
-    /// Mass per area above a height, kg/m². `densities` gives the layers of a material between two heights: the
-    /// upper end of each, and its density, kg/m³.
+    /// Mass per area above a height, kg/m². `densities` gives the layers of a material between two heights:
+    /// the upper end of each, and its density, kg/m³.
     fn mass_above(&self, height: f64, densities: impl Fn(usize, [f64; 2]) -> [(f64, f64); 2]) -> f64 {
         let mut mass = 0.0;
         for &(material, ends) in &self.0 {

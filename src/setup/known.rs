@@ -53,8 +53,8 @@ pub enum Unknown {
 }
 
 /// Collective if `world` is there. Size and cost of a job; what only the first state tells, if that is of
-/// moderate size. Starts MPI and threads where it takes steps. Not generic, so that a program does not compile
-/// the solver anew.
+/// moderate size. Starts MPI and threads where it takes steps. Not generic, so that a program does not
+/// compile the solver anew.
 ///
 /// # Errors
 /// The job has no first state, or the machine is not ready.

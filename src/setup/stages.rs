@@ -79,8 +79,8 @@ fn reduction<const D: usize>(problem: &Problem<D>, search: &FactorSearch) -> Str
     StrengthReduction { from, step, tolerance, materials: problem.materials.iter().map(weakened).collect() }
 }
 
-/// How elastic bodies of a stage hold together, if there are any and boxes follow the deformation. Sections of
-/// rings are not halved.
+/// How elastic bodies of a stage hold together, if there are any and boxes follow the deformation. Sections
+/// of rings are not halved.
 fn cohesion<const D: usize>(problem: &Problem<D>, stage: usize) -> Option<Cohesion> {
     let BoxPolicy::Volume { max_stretch, .. } = problem.boxes else { return None };
     if problem.coordinates == Coordinates::Axisymmetric {

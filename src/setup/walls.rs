@@ -8,8 +8,8 @@ use crate::setup::materials::material_of;
 const CELLS: f64 = 2.0;
 
 /// Whether a collider that acts on particles acts on nodes in a stage: all material that has come by then is
-/// fluid, and it is thick enough. At nodes fluids rest to round-off; at particles rounding lets single ones of a
-/// row that bears their weight go, and they sink.
+/// fluid, and it is thick enough. At nodes fluids rest to round-off; at particles rounding lets single ones
+/// of a row that bears their weight go, and they sink.
 pub fn acts_on_nodes<const D: usize>(problem: &Problem<D>, stage: usize, index: usize) -> bool {
     let collider = &problem.colliders[index];
     if collider.acts_on != ActsOn::Particles || collider.free().is_some() || collider.deforming.is_some() {

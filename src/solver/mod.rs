@@ -50,8 +50,8 @@ use crate::solver::state::parts::{Adaptation, Balance, EquilibriumState, Measure
 use crate::solver::state::phases::{Phase, Phases, thread_time};
 use crate::solver::state::relaxation::RelaxPhase;
 
-/// Length of the step before, over the bound on the next, of which half counts as lag at most. Bounds that vary
-/// with the motion stay well below it, and so do those of trees that are refined by a level.
+/// Length of the step before, over the bound on the next, of which half counts as lag at most. Bounds that
+/// vary with the motion stay well below it, and so do those of trees that are refined by a level.
 const MOST_BEFORE: f64 = 2.1;
 
 impl<const D: usize> Solver<D> {
@@ -195,8 +195,8 @@ impl<const D: usize> Solver<D> {
         }
     }
 
-    /// Not collective. The lag ahead of a step. After a sudden fall of the bound on the step, as where a shock
-    /// begins, forces act over no more than the material bears: the rest of the lag is left out.
+    /// Not collective. The lag ahead of a step. After a sudden fall of the bound on the step, as where a
+    /// shock begins, forces act over no more than the material bears: the rest of the lag is left out.
     fn caught_up_lag(&mut self) -> f64 {
         let (lag, most) = (self.lag(), 0.5 * MOST_BEFORE * self.clock.bound);
         if lag <= most {

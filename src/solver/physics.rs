@@ -256,8 +256,8 @@ impl<const D: usize> Physics<D> {
         self.meets(field) == Meets::Surface || self.moves_until_it_yields(field)
     }
 
-    /// Whether it does as long as it is elastic: where no law at surfaces asks for the area of what has yielded,
-    /// since the sums at nodes then leave out its slope.
+    /// Whether it does as long as it is elastic: where no law at surfaces asks for the area of what has
+    /// yielded, since the sums at nodes then leave out its slope.
     pub(in crate::solver) fn moves_until_it_yields(&self, field: usize) -> bool {
         self.meets(field).yields() && !self.has_walls_by_area()
     }
@@ -268,10 +268,10 @@ impl<const D: usize> Physics<D> {
         self.faces.as_flattened().iter().chain(of_colliders).any(|law| law.acts_by_area())
     }
 
-    /// Whether a collider acts on a velocity field at the feet of the nodes inside it, in this stage. Cohesion
-    /// and drag need the area of the material's surface, which feet know. `sticky` colliders hold solids at
-    /// the nodes, since a grip that leaves the rim of a beam some freedom is too soft; fluids held there slip,
-    /// up to a cell before nodes that are up to a cell behind the surface.
+    /// Whether a collider acts on a velocity field at the feet of the nodes inside it, in this stage.
+    /// Cohesion and drag need the area of the material's surface, which feet know. `sticky` colliders hold
+    /// solids at the nodes, since a grip that leaves the rim of a beam some freedom is too soft; fluids held
+    /// there slip, up to a cell before nodes that are up to a cell behind the surface.
     pub(in crate::solver) fn acts_at_feet(&self, field: usize, collider: &Collider<D>) -> bool {
         let has_feet = match (self.meets(field), collider.contact) {
             (Meets::Feet, _) => true,

@@ -117,9 +117,9 @@ fn change_materials<const D: usize>(chunk: &mut Chunk<D>, materials: &[[u16; 2]]
     }
 }
 
-/// A change of material in which the old one or the new one has water that cannot leave its pores. The history
-/// of the skeleton stays where both have the same. Excess pressure stays where both have water; else there is
-/// none.
+/// A change of material in which the old one or the new one has water that cannot leave its pores. The
+/// history of the skeleton stays where both have the same. Excess pressure stays where both have water; else
+/// there is none.
 fn change_water<const D: usize>(
     chunk: &mut Chunk<D>,
     p: usize,

@@ -22,7 +22,8 @@ pub struct Source<const D: usize> {
     pub level: u8,
     /// Their distance, m.
     pub spacing: f64,
-    /// Mass, kg, of the particles of a layer, by the lines of `entries`: rings have masses in proportion to their radii.
+    /// Mass, kg, of the particles of a layer, by the lines of `entries`: rings have masses in proportion to
+    /// their radii.
     pub masses: Vec<f64>,
     /// Half widths, m, of cubes (squares) of their volumes.
     pub halves: Vec<f64>,
@@ -161,7 +162,8 @@ impl<const D: usize> Source<D> {
         self.masses.iter().sum()
     }
 
-    /// Where the particles of a layer are at a time (s) after it has entered, m, with the numbers of their lines.
+    /// Where the particles of a layer are at a time (s) after it has entered, m, with the numbers of their
+    /// lines.
     pub fn layer(&self, layer: u64, time: f64) -> impl Iterator<Item = (usize, [f64; D])> + '_ {
         let way = time - self.start - self.own_time(layer);
         let all = self.entries.len() as u64;

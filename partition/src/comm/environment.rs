@@ -10,8 +10,8 @@ pub fn is_launched() -> bool {
         .any(|name| std::env::var_os(name).is_some())
 }
 
-/// Not collective. Greatest number of ranks that a launcher says it has started: `mpirun` of Open MPI, that of
-/// MPICH, or `srun`.
+/// Not collective. Greatest number of ranks that a launcher says it has started: `mpirun` of Open MPI, that
+/// of MPICH, or `srun`.
 pub(super) fn launched_ranks() -> Option<usize> {
     let counts = ["OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "SLURM_STEP_NUM_TASKS"];
     counts.iter().filter_map(|name| std::env::var(name).ok()?.trim().parse().ok()).max()

@@ -189,9 +189,9 @@ pub fn survey(
     Ok(all.unwrap_or(Look { range: [0.0; 2], frame: [[0.0; 3], [1.0; 3]], longest: 0.0 }))
 }
 
-/// Quantity that colours pictures of a file where nobody chooses one: damage or plastic strain if any particle
-/// differs in it from others, else the speed, and where all is at rest the displacement or stress; the level
-/// of leaves where the file does not have these.
+/// Quantity that colours pictures of a file where nobody chooses one: damage or plastic strain if any
+/// particle differs in it from others, else the speed, and where all is at rest the displacement or stress;
+/// the level of leaves where the file does not have these.
 pub fn usual_colour(file: &Path, settings: &Settings, scene: &SceneOf<'_>) -> &'static str {
     let look = |name: &str| survey(&[file.to_owned()], name, settings, scene).ok();
     let varies = |name: &&str| look(name).is_some_and(|look| look.range[1] > look.range[0]);

@@ -6,9 +6,9 @@
 //! eigenvalue of the stiffness is negative for any tension, and the body tears (`docs/design/resampling.md`).
 //! So an elastic particle whose box has become wider than [`WIDE`] cells along an axis, and is in tension
 //! along it, becomes two, half as wide along this axis alone. Their centres are where the stretch has carried
-//! those of the halves of the undeformed box, at `± V d`: along the axis itself, material that is stretched on
-//! a slant would move across. Its tag says so (see [`crate::particle::halvings`]). Mass, momentum and angular
-//! momentum are kept as [`pair::part`] says.
+//! those of the halves of the undeformed box, at `± V d`: along the axis itself, material that is stretched
+//! on a slant would move across. Its tag says so (see [`crate::particle::halvings`]). Mass, momentum and
+//! angular momentum are kept as [`pair::part`] says.
 use super::mixture::{Group, mixtures};
 use super::split::moments::spread_on_lattice;
 use super::split::pair;

@@ -7,9 +7,9 @@
 //! since `1(A ∪ B) = 1(A) + 1(B) - 1(A) 1(B)` and `1(A \ B) = 1(A) - 1(A) 1(B)`.
 //!
 //! All of this is exact to rounding where at most one round surface, or one mesh that is closed and not
-//! turned, meets the box, together with any number of planes; of balls and cones in space, to 1e-12 of boxes up
-//! to a third of their radius, and to 1e-10 of wider ones. Boxes that more of them meet are halved
-//! several times, then all but the first round surface become the planes that touch them.
+//! turned, meets the box, together with any number of planes; of balls and cones in space, to 1e-12 of boxes
+//! up to a third of their radius, and to 1e-10 of wider ones. Boxes that more of them meet are halved several
+//! times, then all but the first round surface become the planes that touch them.
 //!
 //! | file | task |
 //! |---|---|

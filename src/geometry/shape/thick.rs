@@ -9,8 +9,9 @@ const MOST: usize = 500_000;
 const SHARES: [f64; 4] = [0.25, 0.5, 0.75, 1.0];
 
 impl<const D: usize> Shape<D> {
-    /// Whether all points down to this depth (m) below any point of the surface lie inside, as far as boxes of
-    /// the edge `cell` (m) see it; of unbounded shapes in the box `domain`. False where that takes too long.
+    /// Whether all points down to this depth (m) below any point of the surface lie inside, as far as boxes
+    /// of the edge `cell` (m) see it; of unbounded shapes in the box `domain`. False where that takes too
+    /// long.
     pub fn is_thick(&self, domain: &Aabb<D>, depth: f64, cell: f64) -> bool {
         let bounds = self.bounds();
         let is_bounded = bounds.lower.iter().chain(&bounds.upper).all(|c| c.is_finite());

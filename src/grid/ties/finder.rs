@@ -119,8 +119,8 @@ impl<const D: usize> Finder<D> {
         new.for_each(|(block, (around, _))| *around = Some(Box::new(Neighbourhood::of(plan, block))));
     }
 
-    /// Finds the real nodes of a block that have mass and touch no well filled cell. Returns whether there are
-    /// any.
+    /// Finds the real nodes of a block that have mass and touch no well filled cell. Returns whether there
+    /// are any.
     fn loosen(
         &self,
         plan: &GridPlan<D>,

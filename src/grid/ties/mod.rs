@@ -96,8 +96,8 @@ impl<const D: usize> Ties<D> {
     }
 
     /// Not collective. Ties the nodes of the velocity field of this number, whose rows hold velocities and
-    /// masses. `held` returns those of some nodes of a block that are fixed by other conditions; these are not
-    /// tied, nor is anything tied to them. Nodes between two bodies belong to neither.
+    /// masses. `held` returns those of some nodes of a block that are fixed by other conditions; these are
+    /// not tied, nor is anything tied to them. Nodes between two bodies belong to neither.
     pub fn tie(
         &mut self,
         plan: &GridPlan<D>,
@@ -116,9 +116,9 @@ impl<const D: usize> Ties<D> {
         memory.tied.pull(fields);
     }
 
-    /// Not collective. The ties of a velocity field, whose rows hold masses; `held` as in [`Ties::tie`], where
-    /// nodes on faces of the domain are not fixed for that alone. Nodes between two bodies have ties as well:
-    /// free, they would have next to no stiffness.
+    /// Not collective. The ties of a velocity field, whose rows hold masses; `held` as in [`Ties::tie`],
+    /// where nodes on faces of the domain are not fixed for that alone. Nodes between two bodies have ties as
+    /// well: free, they would have next to no stiffness.
     pub fn search(
         &mut self,
         plan: &GridPlan<D>,

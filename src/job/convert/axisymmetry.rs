@@ -1,8 +1,8 @@
 //! Axisymmetric jobs: what they cannot have.
 //!
 //! Some settings have no meaning for bodies of revolution, such as gravity across the axis; the others act on
-//! planar sections only so far. Each is refused by name, all in one list; `docs/design/axisymmetry.md` has the
-//! reasons.
+//! planar sections only so far. Each is refused by name, all in one list; `docs/design/axisymmetry.md` has
+//! the reasons.
 use super::checks::Checks;
 use crate::boundary::Collider as Solid;
 use crate::geometry::written::Shape;

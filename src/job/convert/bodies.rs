@@ -40,8 +40,8 @@ pub(super) fn bodies<const D: usize>(
 }
 
 /// Without a word, bodies that keep their shape are fitted to it if they or any that they touch, directly or
-/// through others, are curved: particles of what flows leave their places anyway. Bodies that touch one on the
-/// lattice stay there, since the parts of one and the whole boxes of the other would overlap.
+/// through others, are curved: particles of what flows leave their places anyway. Bodies that touch one on
+/// the lattice stay there, since the parts of one and the whole boxes of the other would overlap.
 fn fit_curved<const D: usize>(mut bodies: Vec<Body<D>>, file: &JobFile, space: &Space<D>) -> Vec<Body<D>> {
     let slack = 1e-9 * space.size.iter().fold(0.0, |most: f64, &size| most.max(size));
     let bounds: Vec<Aabb<D>> = bodies.iter().map(|body| body.shape.bounds().grown(slack)).collect();

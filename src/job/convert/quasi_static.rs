@@ -1,7 +1,7 @@
 //! Load steps: their settings, and what jobs with them cannot have.
 //!
-//! Each setting without a meaning there, or whose forces a load step does not know so far, is refused by name,
-//! all in one list.
+//! Each setting without a meaning there, or whose forces a load step does not know so far, is refused by
+//! name, all in one list.
 use super::checks::Checks;
 use crate::boundary::Contact;
 use crate::job::parse::source::Path;
@@ -64,8 +64,9 @@ pub(super) fn check<const D: usize>(checks: &mut Checks, file: &JobFile, problem
         refuse(moves, here.key("shape"), "particles with velocities", "particles at rest");
     }
     for (i, load) in problem.loads.iter().enumerate().take(file.loads.len()) {
-        let damps = matches!(load.kind, Kind::Damping(_) | Kind::LocalDamping(_));
-        refuse(damps, root.key("loads").index(i).key("kind"), "damping", "forces and grips");
+        let rests =
+            matches!(load.kind, Kind::BodyForce(_) | Kind::Velocity(_) | Kind::Carried(_) | Kind::Water(_));
+        refuse(!rests, root.key("loads").index(i).key("kind"), "damping", "forces and grips");
     }
     for (i, collider) in problem.colliders.iter().enumerate() {
         let here = root.key("colliders").index(i);

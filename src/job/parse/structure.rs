@@ -271,7 +271,8 @@ impl<'s> Checker<'s> {
             }
             // A misspelt key was most likely meant to be one that is missing.
             let keys = layers.properties().filter(|(_, schema)| self.fits(schema)).map(|(known, _)| known);
-            // A key that is there already is meant where it is very near, as in a setting of the command line.
+            // A key that is there already is meant where it is very near, as in a setting of the command
+            // line.
             let is_near = |known: &&str| known.len() > 4 && strsim::damerau_levenshtein(key, known) <= 2;
             let known = keys.clone().filter(|known| node.get(known).is_none() || is_near(known));
             let meant = nearest(key, missing.iter().copied()).or_else(|| nearest(key, known));

@@ -4,8 +4,9 @@ use crate::adaptivity::criteria::Parameters as Criterion;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Dynamic refinement: the tree adapts to the material during the run, and particles split and merge with the size of the cells. Leaves are
-/// never coarser than `tree.base_level` and the levels of `tree.regions`. Without this table, tree and particles are not refined.
+/// Dynamic refinement: the tree adapts to the material during the run, and particles split and merge with the
+/// size of the cells. Leaves are never coarser than `tree.base_level` and the levels of `tree.regions`.
+/// Without this table, tree and particles are not refined.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Adaptivity {
@@ -13,18 +14,19 @@ pub struct Adaptivity {
     #[serde(default = "twenty")]
     #[schemars(range(min = 1, max = 100_000))]
     pub every_steps: u64,
-    /// Width of the layer that is refined around what a criterion marks, in leaves of the level that it asks for. The distance that the
-    /// material can travel until the next change of the tree is added to it.
+    /// Width of the layer that is refined around what a criterion marks, in leaves of the level that it asks
+    /// for. The distance that the material can travel until the next change of the tree is added to it.
     #[serde(default = "one")]
     #[schemars(range(max = 16))]
     pub buffer: u32,
-    /// Stretch at which a particle splits: the width of its box over that of an undeformed particle of its leaf's level; only with `boxes =
-    /// "volume"`.
+    /// Stretch at which a particle splits: the width of its box over that of an undeformed particle of its
+    /// leaf's level; only with `boxes = "volume"`.
     #[serde(default = "default_split")]
     #[schemars(range(max = 8.0), extend("exclusiveMinimum" = 1.0))]
     pub split_stretch: f64,
-    /// Distance between neighbours, in cells, above which each of them splits in two along the line between them, to close gaps in thin
-    /// flow; with 2, gaps in a deposit stay below a cell. Off by default. Torn material, whose volume has grown by half, does not split.
+    /// Distance between neighbours, in cells, above which each of them splits in two along the line between
+    /// them, to close gaps in thin flow; with 2, gaps in a deposit stay below a cell. Off by default. Torn
+    /// material, whose volume has grown by half, does not split.
     #[serde(default)]
     #[schemars(range(min = 0.25, max = 8.0))]
     pub split_gap: Option<f64>,
@@ -63,7 +65,8 @@ pub struct Merge {
     #[serde(default = "default_strain")]
     #[schemars(range(min = 0.0, max = 10.0))]
     pub strain: f64,
-    /// Largest deviation from the mean logarithm of the plastic volume ratio, a measure of how far the grains are apart.
+    /// Largest deviation from the mean logarithm of the plastic volume ratio, a measure of how far the grains
+    /// are apart.
     #[serde(default = "default_volume")]
     #[schemars(range(min = 0.0, max = 10.0))]
     pub volume: f64,

@@ -1,4 +1,4 @@
-//! What several tables of the job file have.
+//! Keys and values that several tables of the job file share.
 use crate::geometry::written::bound_items;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

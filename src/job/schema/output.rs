@@ -1,4 +1,4 @@
-//! What a job writes, as its file has it: outputs, checkpoints, history, telemetry, report.
+//! Files of a run, as a job has them: outputs, checkpoints, history, telemetry, report.
 use super::common::{AxisName, yes};
 use crate::geometry::written::Vector;
 use crate::job::problem::{CollapseLaw, Field};
@@ -9,15 +9,16 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Output {
-    /// Directory for the files of the run, relative to the current directory; `out/` and the name of the job file by default.
+    /// Directory for the files of the run, relative to the current directory; `out/` and the name of the job
+    /// file by default.
     #[serde(default)]
     pub directory: Option<String>,
     /// Simulated time between outputs, s; by default only the start and the end.
     #[serde(default)]
     #[schemars(range(max = 1e12), extend("exclusiveMinimum" = 0.0))]
     pub every: Option<f64>,
-    /// Particle fields; by default id, body, material, leaf_level, velocity, density, pressure, von_mises and plastic_strain, and
-    /// pore_pressure in jobs with water in pores.
+    /// Particle fields; by default id, body, material, leaf_level, velocity, density, pressure, von_mises and
+    /// plastic_strain, and pore_pressure in jobs with water in pores.
     #[serde(default)]
     pub fields: Option<Vec<Field>>,
     /// Whether each output contains the complete state, so that a run can restart from it.
@@ -30,7 +31,8 @@ pub struct Output {
     /// plastic strain, else the speed.
     #[serde(default)]
     pub picture_field: Option<Field>,
-    /// Whether the run writes the HTML page `JOB.report.html` when it ends, fails or is stopped, as `agimp report` does.
+    /// Whether the run writes the HTML page `JOB.report.html` when it ends, fails or is stopped, as
+    /// `agimp report` does.
     #[serde(default)]
     pub report: bool,
 }
@@ -72,7 +74,8 @@ impl Default for Output {
     }
 }
 
-/// Checkpoints. Without an interval, a run writes one only when asked to stop, and at its end if the outputs contain no state.
+/// Checkpoints. Without an interval, a run writes one only when asked to stop, and at its end if the outputs
+/// contain no state.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Checkpoint {
@@ -112,7 +115,8 @@ pub struct History {
     #[serde(default = "ten")]
     #[schemars(range(min = 1, max = 1_000_000_000_000_u64))]
     pub every_steps: u64,
-    /// Whether to record the mean force on each face of the domain since the previous row, N: `force_x_min_x` and so on.
+    /// Whether to record the mean force on each face of the domain since the previous row, N: `force_x_min_x`
+    /// and so on.
     #[serde(default)]
     pub face_forces: bool,
 }

@@ -65,7 +65,7 @@ fn keys(out: &mut String, object: &Value) {
     }
 }
 
-/// What may stand behind a key.
+/// Values that a key may have.
 fn value(property: &Value) -> String {
     if let Some(name) = property["$ref"].as_str().and_then(|path| path.rsplit('/').next()) {
         let definitions = &super::json::schema()["$defs"][name];

@@ -5,15 +5,16 @@ use super::equilibrium::Equilibrium;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// A stage of the run. Stages run in the order of the file; the first starts at t = 0. A change stays in force until another stage changes
-/// it again. Loads and colliders name the stages in which they act, bodies the stage in which they appear.
+/// A stage of the run. Stages run in the order of the file; the first starts at t = 0. A change stays in
+/// force until another stage changes it again. Loads and colliders name the stages in which they act, bodies
+/// the stage in which they appear.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Stage {
     /// Name, of letters, digits, `_` and `-`.
     pub name: String,
-    /// Maximum duration, s: the stage ends with the first step that reaches it. By default the stage lasts until `time.end`, which ends the
-    /// run in any stage.
+    /// Maximum duration, s: the stage ends with the first step that reaches it. By default the stage lasts
+    /// until `time.end`, which ends the run in any stage.
     #[serde(default)]
     #[schemars(range(max = 1e12), extend("exclusiveMinimum" = 0.0))]
     pub duration: Option<f64>,
@@ -44,9 +45,10 @@ pub struct Stage {
     pub strength_reduction: Option<StrengthReduction>,
 }
 
-/// The strength of all materials is divided by a factor that grows by 1 in 1 s, a load step after the other: cohesion, yield stress and the
-/// tangents of friction angles. A step without equilibrium is cut in half. The run ends with the greatest factor that has equilibrium: the
-/// factor of safety. Forces balance on the shape of the ground at the start of each step.
+/// The strength of all materials is divided by a factor that grows by 1 in 1 s, a load step after the other:
+/// cohesion, yield stress and the tangents of friction angles. A step without equilibrium is cut in half. The
+/// run ends with the greatest factor that has equilibrium: the factor of safety. Forces balance on the shape
+/// of the ground at the start of each step.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct StrengthReduction {
@@ -65,8 +67,9 @@ pub struct StrengthReduction {
     #[serde(default = "default_difference")]
     #[schemars(range(min = 1e-6, max = 1.0))]
     pub tolerance: f64,
-    /// Whether flow is associated, with cohesion and tan φ times `cos ψ cos φ / (1 - sin ψ sin φ)` (Davis 1968; Sysala et al. 2023): the factor
-    /// then does not depend on steps. Without, material whose flow is not associated keeps it.
+    /// Whether flow is associated, with cohesion and tan φ times `cos ψ cos φ / (1 - sin ψ sin φ)`
+    /// (Davis 1968; Sysala et al. 2023): the factor then does not depend on steps. Without, material whose
+    /// flow is not associated keeps it.
     #[serde(default = "default_davis")]
     pub davis: bool,
 }
@@ -87,8 +90,9 @@ fn default_davis() -> bool {
     true
 }
 
-/// A body gets another material. The elastic strain of its particles stays, so stress follows the new elastic constants; so do masses and
-/// volumes. History variables stay between materials that have the same ones, and are reset otherwise.
+/// A body gets another material. The elastic strain of its particles stays, so stress follows the new elastic
+/// constants; so do masses and volumes. History variables stay between materials that have the same ones, and
+/// are reset otherwise.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct NewMaterial {

@@ -8,10 +8,10 @@
 //! zero on real nodes). Then `C = B D⁻¹` (APIC, Jiang et al. 2015), `x += Δt v`,
 //! `b = (1 + Δt ∇v) b (1 + Δt ∇v)ᵀ`, and the material maps b back and gives the stress.
 //!
-//! In axisymmetry velocity and B belong to the centre of mass of the box, and `∇v` has the rate along the hoop,
-//! `L_θθ = Σ v_r T` (see [`super::p2g`]). The position is the centre of the box, which moves with the plain mean
-//! of the velocity over the box. So the radius grows at the rate `r L_θθ`: the stretch along the hoop is the
-//! ratio of the radii, whatever the motion.
+//! In axisymmetry velocity and B belong to the centre of mass of the box, and `∇v` has the rate along the
+//! hoop, `L_θθ = Σ v_r T` (see [`super::p2g`]). The position is the centre of the box, which moves with
+//! the plain mean of the velocity over the box. So the radius grows at the rate `r L_θθ`: the stretch along
+//! the hoop is the ratio of the radii, whatever the motion.
 //!
 //! | file | what it holds |
 //! |---|---|

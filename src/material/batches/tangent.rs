@@ -1,8 +1,9 @@
 //! Tangents: the derivative of the stress at the end of an update by the deformation, for Newton's method.
 //!
-//! A law is an isotropic function of the trial tensor b: with principal values `b_k = exp(2 ε_k)` and the unit
-//! vectors `n_k` of their directions, `τ = Σ τ_k(ε) n_k ⊗ n_k`. A further deformation with the gradient l of
-//! displacements, symmetric part d and skew part w, in the axes `n_k`, changes b by `l b + b lᵀ`, and so τ by
+//! A law is an isotropic function of the trial tensor b: with principal values `b_k = exp(2 ε_k)` and the
+//! unit vectors `n_k` of their directions, `τ = Σ τ_k(ε) n_k ⊗ n_k`. A further deformation with the
+//! gradient l of displacements, symmetric part d and skew part w, in the axes `n_k`, changes b by
+//! `l b + b lᵀ`, and so τ by
 //!
 //! ```text
 //! δτ_kk = Σ_m A_km d_mm,   A_km = ∂τ_k/∂ε_m
@@ -10,7 +11,8 @@
 //! ```
 //!
 //! for k ≠ m: the divided differences of Daleckii and Krein (1965); of equal values they are the derivatives
-//! `(A_kk - A_km - A_mk + A_mm)/2`. A comes from the law itself, with numbers that carry derivatives ([`Dual`]).
+//! `(A_kk - A_km - A_mk + A_mm)/2`. A comes from the law itself, with numbers that carry derivatives
+//! ([`Dual`]).
 use crate::material::tensor::eigen::{Symmetric, decompose};
 use crate::material::{Law, State, Step};
 use crate::simd::math::{exp, ln};
@@ -23,8 +25,8 @@ const NEAR: f64 = 3e-8;
 /// pressure alone have a corner without one.
 const NONE: f64 = 1e-10;
 
-/// Derivative of the Kirchhoff stress of a batch at the end of an update by a deformation of the body in which
-/// it ends: 18 numbers for each particle.
+/// Derivative of the Kirchhoff stress of a batch at the end of an update by a deformation of the body in
+/// which it ends: 18 numbers for each particle.
 #[derive(Clone, Copy, Debug)]
 pub struct Tangent {
     /// Two of three principal directions; the third is normal to them.
@@ -86,8 +88,8 @@ impl Tangent {
         self
     }
 
-    /// The one whose normal part is the mean of A and its transpose: of laws whose flow is not associated, for
-    /// solvers of symmetric systems.
+    /// The one whose normal part is the mean of A and its transpose: of laws whose flow is not associated,
+    /// for solvers of symmetric systems.
     pub fn symmetric(mut self) -> Self {
         for [k, m] in PAIRS {
             let mean = (self.normal[k][m] + self.normal[m][k]) * 0.5;

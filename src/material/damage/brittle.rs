@@ -1,15 +1,15 @@
 //! Brittle solid: Hencky elasticity with isotropic damage.
 //!
 //! With the effective Kirchhoff stress `τ̄` of the whole material, the driving strain is `⟨τ̄₁⟩/E` (Rankine),
-//! `√Σ⟨ε_i⟩²`, or `√(Σ⟨τ̄_i⟩ε_i/E)`, κ its greatest value so far, and `τ = (1 - D(κ)) τ̄`; with damage in
-//! tension only, D lowers the principal stresses above zero. Dissipated is the energy that the loss of stiffness
-//! sets free, `Y dD` with `Y = ½ Σ τ̄_i ε_i` over the lowered stresses: exact along proportional paths, which
-//! are those between two states of a step. D is kept, κ follows from it.
+//! `√Σ⟨ε_i⟩²`, or `√(Σ⟨τ̄_i⟩ε_i/E)`, κ its greatest value so far, and `τ = (1 - D(κ)) τ̄`; with damage
+//! in tension only, D lowers the principal stresses above zero. Dissipated is the energy that the loss of
+//! stiffness sets free, `Y dD` with `Y = ½ Σ τ̄_i ε_i` over the lowered stresses: exact along
+//! proportional paths, which are those between two states of a step. D is kept, κ follows from it.
 //!
 //! In a band that opens between solids that stay, the strain along the crack stays too, and
-//! `Y = ½ κ τ̄₁ (1 + ν)(1 - 2ν)/(1 - ν)` with Rankine's κ: the crack takes that share of the energy of
-//! fracture. The third driving strain is that of which `Y = ½ E κ²` in any state of tension, so its cracks take
-//! all of it.
+//! `Y = ½ κ τ̄₁ (1 + ν)(1 - 2ν)/(1 - ν)` with Rankine's κ: the crack takes that share of the
+//! energy of fracture. The third driving strain is that of which `Y = ½ E κ²` in any state of tension, so
+//! its cracks take all of it.
 use super::softening::Curve;
 use super::{Damage, Softening};
 use crate::material::solid::Hencky;

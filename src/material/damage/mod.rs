@@ -64,9 +64,9 @@ pub enum Damage {
     },
     /// Cracks open by the energy that damage sets free (Simo and Ju 1987): the driving strain is the root of
     /// the sum of stress times strain over Young's modulus, over the principal stresses in tension. A crack
-    /// takes the energy of fracture whatever Poisson's ratio: of the other kinds it takes it where the material
-    /// may contract along the crack, as in a bar, and `(1 + ν)(1 - 2ν)/(1 - ν)` of it (`strain`: one over that)
-    /// in a band between solids that stay: 0.9 with 0.2.
+    /// takes the energy of fracture whatever Poisson's ratio: of the other kinds it takes it where the
+    /// material may contract along the crack, as in a bar, and `(1 + ν)(1 - 2ν)/(1 - ν)` of it
+    /// (`strain`: one over that) in a band between solids that stay: 0.9 with 0.2.
     Energy {
         /// Strength in uniaxial tension f, Pa: a Kirchhoff stress.
         #[schemars(range(max = 1e13), extend("exclusiveMinimum" = 0.0))]

@@ -2,8 +2,8 @@
 //! `τ₁ ≥ τ₂ ≥ τ₃`: `f = (τ₁ - τ₃) + (τ₁ + τ₃) sin φ - 2c cos φ`.
 //!
 //! Flow is along the same with the dilation angle ψ in place of φ, exact on edges and at the apex
-//! (`strength/coulomb.rs`). With `flow = "radial"` the deviator shrinks instead and the mean stays: isochoric,
-//! as Drucker-Prager's.
+//! (`strength/coulomb.rs`). With `flow = "radial"` the deviator shrinks instead and the mean stays:
+//! isochoric, as Drucker-Prager's.
 //!
 //! Cohesion hardens or softens with `κ = √(2/3) |dev ε_p|`; angles may soften with it. Where the material
 //! opens (apex, cut-off), the volume that it gains is stored, and given back on compression (Tampubolon et

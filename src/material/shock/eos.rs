@@ -45,8 +45,8 @@ const GAUSS: [[f64; 2]; 8] = [
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(tag = "kind", rename_all = "snake_case", deny_unknown_fields)]
 pub enum Eos {
-    /// Mie-Grüneisen about the states behind shocks, which travel at `sound_speed + slope u` into metal at rest
-    /// that they set in motion at u.
+    /// Mie-Grüneisen about the states behind shocks, which travel at `sound_speed + slope u` into metal at
+    /// rest that they set in motion at u.
     MieGruneisen {
         /// Speed c₀ of weak shocks in metal without strength, m/s: the bulk modulus is `density c₀²`.
         #[schemars(range(max = 1e5), extend("exclusiveMinimum" = 0.0))]

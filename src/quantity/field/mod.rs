@@ -1,8 +1,8 @@
 //! Fields: values at places, from rasters and tables of points in files.
 //!
-//! On a grid of places a field is linear along each coordinate. Between points of a plane that are no grid it is
-//! linear on triangles (Delaunay 1934). Outside it has the value of its nearest place. Its bits do not depend on
-//! the order of the points.
+//! On a grid of places a field is linear along each coordinate. Between points of a plane that are no grid it
+//! is linear on triangles (Delaunay 1934). Outside it has the value of its nearest place. Its bits do not
+//! depend on the order of the points.
 //!
 //! | file | what it holds |
 //! |---|---|
@@ -45,8 +45,8 @@ struct Grid {
 }
 
 impl Field {
-    /// A field over x and y from a raster: `values` in rows from south to north, `columns` from west to east in
-    /// each, the first at `corner`, m, with neighbours `cell` (m) apart.
+    /// A field over x and y from a raster: `values` in rows from south to north, `columns` from west to east
+    /// in each, the first at `corner`, m, with neighbours `cell` (m) apart.
     pub fn raster(values: Vec<f64>, columns: usize, cell: f64, corner: [f64; 2]) -> Self {
         let rows = values.len() / columns;
         let places = |count: usize, from: f64| (0..count).map(|i| (i as f64).mul_add(cell, from)).collect();

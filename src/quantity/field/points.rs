@@ -1,5 +1,5 @@
-//! Tables of points from files: the first line names the columns, `x`, `y` and `z` (m) among them, as far as the
-//! values depend on them.
+//! Tables of points from files: the first line names the columns, `x`, `y` and `z` (m) among them, as far as
+//! the values depend on them.
 use std::path::Path;
 
 use super::triangles::Triangles;
@@ -12,7 +12,8 @@ use crate::quantity::record::{self, Column, MOST_BYTES, RecordError, Rows};
 /// The field of a table of points; by default its values are in the first column that is no coordinate.
 ///
 /// # Errors
-/// The file cannot be read, is no such table, has a place twice, or points between which nothing can be found.
+/// The file cannot be read, is no such table, has a place twice, or points between which nothing can be
+/// found.
 pub fn read(path: &Path, value: Option<&Column>) -> Result<Field, RecordError> {
     parse(&input_file::read(path, MOST_BYTES)?, value)
 }
@@ -102,7 +103,8 @@ mod tests {
         }
     }
 
-    /// Grids over the vertical plane and over space, and points that are no grid, have a linear field exactly.
+    /// Grids over the vertical plane and over space, and points that are no grid, have a linear field
+    /// exactly.
     #[test]
     fn a_linear_field_comes_out() {
         let value = |x: f64, y: f64, z: f64| 1.0 + 2.0 * x - 3.0 * y + 0.5 * z;

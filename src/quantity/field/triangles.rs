@@ -20,8 +20,8 @@ impl HasPosition for Sample {
     }
 }
 
-/// A search in it begins at a place that depends on nothing but the point, so that its result has the same bits
-/// in any thread.
+/// A search in it begins at a place that depends on nothing but the point, so that its result has the same
+/// bits in any thread.
 type Mesh = DelaunayTriangulation<Sample, (), (), (), HierarchyHintGenerator<f64>>;
 
 /// Values at points over two coordinates.

@@ -1,5 +1,5 @@
-//! Surroundings of the particles in pictures: colliders where they are, and how wide boxes are; the last state
-//! of a run.
+//! Surroundings of the particles in pictures: colliders where they are, and how wide boxes are; the last
+//! state of a run.
 pub mod boxes;
 
 use std::path::{Path, PathBuf};
@@ -63,8 +63,8 @@ pub struct LastState<'a, const D: usize> {
 /// The picture cannot be written; why, in words; the same on all ranks.
 pub type Draw<const D: usize> = dyn Fn(&Comm, LastState<'_, D>, &Path) -> Result<(), String>;
 
-/// Functions that draw the last state of a run. The solver knows no pictures: who starts a run says what draws
-/// them.
+/// Functions that draw the last state of a run. The solver knows no pictures: who starts a run says what
+/// draws them.
 #[derive(Clone, Copy)]
 pub struct Pictures<'a> {
     /// In two dimensions.

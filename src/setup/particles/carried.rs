@@ -2,10 +2,10 @@
 //! point forces.
 //!
 //! The surface of the bodies is cut by the lattice of particles. A piece belongs to the particle in its box,
-//! or to the one that has taken over the part of the body there; where boxes do not tile leaves and one has no
-//! particle, since its centre is not in the body, to the first particle inwards. Bodies against
-//! each other have no surface between them, nor has a body one on a face of the domain. All follows from job
-//! and tree, so each rank finds what its own particles carry, in the same order on any partition.
+//! or to the one that has taken over the part of the body there; where boxes do not tile leaves and one has
+//! no particle, since its centre is not in the body, to the first particle inwards. Bodies against each other
+//! have no surface between them, nor has a body one on a face of the domain. All follows from job and tree,
+//! so each rank finds what its own particles carry, in the same order on any partition.
 
 use partition::comm::{Comm, Disagreement};
 use rayon::prelude::*;

@@ -3,14 +3,14 @@
 //! A box of the lattice that the surface of a body cuts gives a particle with the volume and the centroid of
 //! the part of the body in it. Parts below a tenth of a box join a neighbour in their leaf, volume and
 //! centroid kept, unless it has none. So the particles of a body have its volume and its centroid, whatever
-//! its surface. Bodies whose `sampling` is `fitted` have such particles. All follows from the body and the leaf
-//! alone.
+//! its surface. Bodies whose `sampling` is `fitted` have such particles. All follows from the body and the
+//! leaf alone.
 use super::lattice::{lattice_of, spacing};
 use crate::geometry::{Aabb, Sampling, Shape, Side};
 use crate::job::problem::{Body, Problem};
 
-/// Parts of a box below this share are none, and those that lack no more are whole: they come from rounding of
-/// faces that lie on the lattice.
+/// Parts of a box below this share are none, and those that lack no more are whole: they come from rounding
+/// of faces that lie on the lattice.
 const ROUNDING: f64 = 1e-9;
 /// Parts of a box below this share join a neighbour.
 const SMALL: f64 = 0.1;
@@ -33,7 +33,7 @@ pub(super) struct Point<const D: usize> {
     pub(super) joined: Vec<[u64; D]>,
 }
 
-/// What is in a box.
+/// Contents of a box.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Part<const D: usize> {
     /// m³ (m² in the plane).
@@ -48,9 +48,9 @@ impl<const D: usize> Point<D> {
     }
 }
 
-/// Whether a body has the parts of its boxes, as its sampling says. Else it has the points of the lattice that
-/// it contains, and so do fluids, whose shift of volume takes the small gaps and overlaps of cut boxes for void
-/// and excess.
+/// Whether a body has the parts of its boxes, as its sampling says. Else it has the points of the lattice
+/// that it contains, and so do fluids, whose shift of volume takes the small gaps and overlaps of cut boxes
+/// for void and excess.
 pub(super) fn has_parts<const D: usize>(problem: &Problem<D>, body: &Body<D>) -> bool {
     let material = &problem.materials[body.material];
     matches!(body.sampling, Sampling::Fitted) && !material.build().is_fluid()

@@ -12,8 +12,8 @@ use crate::text::{excerpt, quantity};
 /// Boxes tested for bodies inside colliders.
 const BOXES: usize = 50_000;
 
-/// Warns of colliders that material may pass through or never touches, of bodies that begin inside one, and of
-/// combinations with known errors.
+/// Warns of colliders that material may pass through or never touches, of bodies that begin inside one, and
+/// of combinations with known errors.
 pub(super) fn look<const D: usize>(problem: &Problem<D>, all: &mut Vec<String>) {
     let mut boxes = BOXES;
     moving_tank(problem, all);

@@ -135,8 +135,8 @@ fn of_body<const D: usize>(
     }
 }
 
-/// Greatest acceleration of gravity and of body forces everywhere, times the height of a body along it, m²/s²;
-/// approximate, and only as exact as the comparison with `limit` requires.
+/// Greatest acceleration of gravity and of body forces everywhere, times the height of a body along it,
+/// m²/s²; approximate, and only as exact as the comparison with `limit` requires.
 fn greatest_fall<const D: usize>(problem: &Problem<D>, body: &Body<D>, limit: f64) -> f64 {
     if body.given.is_some() {
         return 0.0;

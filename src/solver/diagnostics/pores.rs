@@ -4,7 +4,7 @@ use crate::particle::chunk::Chunk;
 use crate::particle::pores::{excess_pressure, given_pressure};
 use crate::solver::state::Solver;
 
-/// What the pressure in pores follows from, at a time.
+/// Origin of the pressure in pores at a time.
 pub(super) struct Pores<'a, const D: usize> {
     water: Option<(&'a Load<D>, &'a Water)>,
     head: Option<usize>,

@@ -13,11 +13,11 @@ use crate::simd::{LANES, Lanes, Vector};
 use crate::solver::physics::Physics;
 use crate::solver::state::Solver;
 
-/// Number of sums: mass, volume, mass times place, momentum, energies, volume times stress, plastic strain and
-/// pressure in pores.
+/// Number of sums: mass, volume, mass times place, momentum, energies, volume times stress, plastic strain
+/// and pressure in pores.
 const SUMS: usize = 2 + 3 + 3 + 3 + 6 + 1 + 1;
 
-/// What is asked of particles beyond what costs nothing.
+/// Quantities of particles that take extra work.
 pub(super) struct Wanted<'a, const D: usize> {
     /// Elastic energy.
     energy: bool,

@@ -12,8 +12,8 @@ use crate::load::{Load, Water};
 use crate::quantity::in_job;
 use crate::solver::state::Solver;
 
-/// Least number of cells of the lattice along the longest edge of a collider, and of points along an edge of a
-/// face, in 2D and 3D.
+/// Least number of cells of the lattice along the longest edge of a collider, and of points along an edge of
+/// a face, in 2D and 3D.
 const FINE: [f64; 2] = [256.0, 64.0];
 
 /// Surfaces on which water may press.
@@ -74,8 +74,8 @@ impl<const D: usize> Thrust<D> {
         each.collect()
     }
 
-    /// Not collective. Force of the water on each face of the domain along its axis, N: the lower and the upper
-    /// one of each axis, where no collider stands; in plane strain per metre of thickness.
+    /// Not collective. Force of the water on each face of the domain along its axis, N: the lower and the
+    /// upper one of each axis, where no collider stands; in plane strain per metre of thickness.
     pub fn on_faces(&self, solver: &Solver<D>) -> Vec<f64> {
         let Some(acting) = acting(solver) else { return vec![0.0; 2 * D] };
         let present = solver.physics.colliders.iter().zip(&solver.contacts.states);

@@ -124,8 +124,8 @@ impl<const D: usize> Wall<D> {
         if size > most { force.map(|force| most / size * force) } else { force }
     }
 
-    /// Change of the friction with the displacement of the node, with the sign turned, N/m. A symmetric matrix,
-    /// as the greatest friction stays.
+    /// Change of the friction with the displacement of the node, with the sign turned, N/m. A symmetric
+    /// matrix, as the greatest friction stays.
     pub(super) fn tangent(&self, way: &[f64; D]) -> [[f64; D]; D] {
         let (force, size) = self.trial(way);
         let own = &self.friction;

@@ -50,8 +50,8 @@ const FAST: u32 = 6;
 type Pull<const D: usize> = (usize, usize, [f64; D]);
 
 impl<const D: usize> Solver<D> {
-    /// Collective. A load step from the present time of at most `dt`, s. Returns its length, and what has moved
-    /// or why the step failed.
+    /// Collective. A load step from the present time of at most `dt`, s. Returns its length, and what has
+    /// moved or why the step failed.
     pub(in crate::solver) fn load_step(&mut self, dt: f64) -> (f64, Result<Moved, StepError>) {
         let Some(settings) = self.physics.quasi_static else { return (dt, Ok(Moved::default())) };
         self.chunks.iter_mut().for_each(stop);

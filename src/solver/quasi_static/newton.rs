@@ -1,9 +1,9 @@
 //! Newton's method for the balance of forces at the nodes, with conjugate gradients for its linear systems.
 //!
 //! The residual is the force on nodes that are neither held nor tied, of loads and gravity at the end of the
-//! step and of stress. A correction solves the linearised balance, with the prescribed displacements as far as
-//! they are not reached, to a tolerance that falls with the residual (Eisenstat and Walker 1996); then it is
-//! halved until the residual, or its work on the correction, has fallen.
+//! step and of stress. A correction solves the linearised balance, with the prescribed displacements as far
+//! as they are not reached, to a tolerance that falls with the residual (Eisenstat and Walker 1996); then it
+//! is halved until the residual, or its work on the correction, has fallen.
 use super::held::{Held, Wall};
 use super::multigrid::Multigrid;
 use super::points::{Points, Sweep};

@@ -113,7 +113,7 @@ fn batch_of<const D: usize>(gradients: &[([[f64; D]; D], f64)], first: usize) ->
     std::array::from_fn(|i| std::array::from_fn(|k| one(i, k)))
 }
 
-/// What the particles do with the gradients of the nodes' displacements.
+/// Use that the particles make of the gradients of the nodes' displacements.
 #[derive(Clone, Copy)]
 pub(super) enum Sweep {
     /// They take on the deformation of the displacements since the start of the step.

@@ -28,13 +28,13 @@ pub(super) type Nodal<const D: usize> = Vec<[f64; D]>;
 /// Two such vectors.
 type Pair<'a, const D: usize> = (&'a [[f64; D]], &'a [[f64; D]]);
 
-/// Mass of a node, over that of the heaviest around, below which it moves with this one. Nodes at jumps of the
-/// level that meet the surface have no other tie, and left free they take multigrid half as many iterations
-/// more.
+/// Mass of a node, over that of the heaviest around, below which it moves with this one. Nodes at jumps of
+/// the level that meet the surface have no other tie, and left free they take multigrid half as many
+/// iterations more.
 const SLIVER: f64 = 0.03;
 
-/// The same for bodies of revolution, where nodes on the axis have little mass and are not loose: with the share
-/// above a cavity in clay finds no equilibrium.
+/// The same for bodies of revolution, where nodes on the axis have little mass and are not loose: with the
+/// share above a cavity in clay finds no equilibrium.
 const SLIVER_OF_RINGS: f64 = 1e-4;
 /// No unknown.
 const NONE: u32 = u32::MAX;

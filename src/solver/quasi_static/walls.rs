@@ -2,8 +2,8 @@
 //!
 //! A wall holds a node on it or inside it along its normal n, `n·u = n·s`, with its own displacement s. One
 //! that separates does so only while it presses. Which of these is so is found as the iteration goes on (an
-//! active set): each step begins with all nodes held; a node that is pulled leaves, one that comes too near is
-//! held again. After some rounds only nodes that are most wrong change, lest they go in circles.
+//! active set): each step begins with all nodes held; a node that is pulled leaves, one that comes too near
+//! is held again. After some rounds only nodes that are most wrong change, lest they go in circles.
 //!
 //! Friction is the force of a stiff spring along the wall, of at most μ N (Coulomb), with its tangent in
 //! Newton's matrix. In each round it begins anew from the force that it has, under the normal force N of the
@@ -23,8 +23,8 @@ const SAME: f64 = 1e-9;
 /// Part of a unit vector beside those that hold a node already from which it is another condition.
 const OTHER: f64 = 0.05;
 
-/// Stiffness of the springs of friction over that of their nodes. In each round the slip of what sticks falls by
-/// about this; much stiffer springs let Newton's method go in circles between nodes that stick and slide.
+/// Stiffness of the springs of friction over that of their nodes. In each round the slip of what sticks falls
+/// by about this; much stiffer springs let Newton's method go in circles between nodes that stick and slide.
 const SPRING: f64 = 10.0;
 
 /// Tangents of friction by node, N/m.
@@ -111,9 +111,9 @@ impl<const D: usize> Unknowns<D> {
     }
 
     /// Collective, with one reduction. Finds the states of the walls, and friction, from displacements (m),
-    /// the forces that are left (N) and the stiffness of the nodes, N/m; forces up to `slack` (N) count as none.
-    /// States change where they are most wrong: down to a `share` of the greatest excess. Returns whether any
-    /// is another on this rank.
+    /// the forces that are left (N) and the stiffness of the nodes, N/m; forces up to `slack` (N) count as
+    /// none. States change where they are most wrong: down to a `share` of the greatest excess. Returns
+    /// whether any is another on this rank.
     pub(super) fn settle_walls(
         &mut self,
         comm: &Comm,

@@ -114,9 +114,9 @@ impl<const D: usize> GroundLeaf<D> {
     }
 
     /// Calls `each` with the two nodes of each edge of a cell with ground, the lower first, and what it
-    /// conducts, m²/s (in plane strain m/s): the quadrature at the corners of the interpolation in the cell. Of
-    /// rings an edge along the axis conducts for the half of the cell next to it, one along the radius over the
-    /// circumference at its middle.
+    /// conducts, m²/s (in plane strain m/s): the quadrature at the corners of the interpolation in the cell.
+    /// Of rings an edge along the axis conducts for the half of the cell next to it, one along the radius
+    /// over the circumference at its middle.
     pub(super) fn for_each_edge(&self, mut each: impl FnMut(usize, usize, f64)) {
         let area = self.cell.powi(D as i32 - 2) / f64::from(1u32 << (D - 1));
         for cell in self.cells() {
@@ -132,9 +132,9 @@ impl<const D: usize> GroundLeaf<D> {
         }
     }
 
-    /// Moves the parts of cells that conduct half the way to their shares below the free surface: the means over
-    /// their edges along the vertical axis of those of still water, by the pressure heads at the nodes, m. With
-    /// one share for the mean of all corners the surface would go on swinging.
+    /// Moves the parts of cells that conduct half the way to their shares below the free surface: the means
+    /// over their edges along the vertical axis of those of still water, by the pressure heads at the nodes,
+    /// m. With one share for the mean of all corners the surface would go on swinging.
     pub(super) fn follow_surface(&mut self, vertical: usize, pressure: impl Fn(usize) -> f64) {
         let cells: Vec<usize> = self.cells().collect();
         for cell in cells {

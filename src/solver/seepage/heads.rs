@@ -77,8 +77,8 @@ impl Heads {
         let (extent, axis) = (plan.extent(), held.up.axis);
         let finest = plan.tree.own_leaves().map(|leaf| plan.tree.leaves()[leaf].level).max().unwrap_or(0);
         let cell = nodes.comm.min_f64(plan.cell(finest));
-        // The volume of the cells with ground at each node; of rings that of their sections, which says as well
-        // whether it is all.
+        // The volume of the cells with ground at each node; of rings that of their sections, which says as
+        // well whether it is all.
         let rows = nodes.sum(ground, |leaf, rows| {
             let share = (0.5 * leaf.cell).powi(D as i32);
             for cell in leaf.cells() {

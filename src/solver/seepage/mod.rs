@@ -2,9 +2,9 @@
 //!
 //! Darcy's flow `-k ∇h` conserves its volume. Each cell with material conducts as its permeability, and the
 //! interpolation in it is that of the tree: constrained nodes take the heads of their parents and hand their
-//! flows to these. Rings conduct over their circumference. Nothing is gathered; a solution takes an exchange of sums and three small reductions for each
-//! step of conjugate gradients. Particles carry the head about them as a linear function, with which they move,
-//! split and go to other ranks, until heads are found anew.
+//! flows to these. Rings conduct over their circumference. Nothing is gathered; a solution takes an exchange
+//! of sums and three small reductions for each step of conjugate gradients. Particles carry the head about
+//! them as a linear function, with which they move, split and go to other ranks, until heads are found anew.
 //!
 //! | file | what it holds |
 //! |---|---|
@@ -64,8 +64,8 @@ impl<const D: usize> Solver<D> {
         })
     }
 
-    /// Not collective. Whether heads are due before a step: at multiples of the time between solutions, counted
-    /// from the start of the water.
+    /// Not collective. Whether heads are due before a step: at multiples of the time between solutions,
+    /// counted from the start of the water.
     pub(super) fn heads_are_due(&self) -> bool {
         let (Some(seepage), Some((load, _))) =
             (&self.physics.seepage, self.physics.water_at(self.clock.time))

@@ -169,12 +169,12 @@ impl ExactSums<LOAD_SUMS> {
     }
 }
 
-/// What a particle gave to a face of the domain that its way led to.
+/// Impulse of a particle on a face of the domain that its way led to.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::solver) struct Struck<const D: usize> {
     /// Number of the face: lower and upper along each axis.
     pub face: usize,
-    /// What it gave, kg m/s.
+    /// The impulse, kg m/s.
     pub impulse: [f64; D],
 }
 

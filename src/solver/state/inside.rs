@@ -18,7 +18,7 @@ const DEEP: f64 = 2.0;
 /// Length, in cells, of the way from a surface at which its other side is looked for.
 const WAY: f64 = 1e-3;
 
-/// What is asked of the nodes inside a collider, beside which they are.
+/// Properties of nodes inside a collider that are asked for, beside which they are.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::solver) struct Asked {
     /// Whether the surfaces that they are behind are: for feet and gaps.
@@ -31,7 +31,7 @@ impl Asked {
     /// Nothing.
     pub(in crate::solver) const NODES: Self = Self { planes: false, normals: false };
 
-    /// What the velocity fields of a problem ask of the nodes inside a collider.
+    /// Those that the velocity fields of a problem need inside a collider.
     pub(in crate::solver) fn of<const D: usize>(physics: &Physics<D>, collider: &Collider<D>) -> Self {
         let at_feet = |field: usize| physics.acts_at_feet(field, collider);
         let over_gaps = |field: usize| physics.moves_over_gaps(field);

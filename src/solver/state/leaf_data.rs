@@ -25,9 +25,9 @@ pub struct LeafData<const D: usize> {
     pub(in crate::solver) shifts: Vec<[f64; D]>,
     /// Work of artificial viscosity in the last step and the part of it that is heat of the material, J.
     pub(in crate::solver) shocks: Vec<[f64; SHOCK_SUMS]>,
-    /// What particles gave to faces of the domain in the last step.
+    /// Impulses of particles on faces of the domain in the last step.
     pub(in crate::solver) struck: Vec<Vec<Struck<D>>>,
-    /// What particles that failed in the last step contribute to sums.
+    /// Contributions of particles that failed in the last step to sums.
     pub(in crate::solver) failed: Vec<Vec<[f64; FAILED_SUMS]>>,
     /// Where the particles were in memory at the start of the last G2P.
     pub(in crate::solver) places: Vec<Place>,

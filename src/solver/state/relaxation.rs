@@ -6,8 +6,8 @@ use crate::text::quantity;
 /// Progress of kinetic damping towards equilibrium; the same on all ranks.
 ///
 /// In a step from rest forces act over half its length, so a mode of frequency ω and amplitude a at rest is
-/// at `a (1 - ω² Δt² / 2)` after it. Steps of one length have places `a cos nθ`, so at no stop is a mode further
-/// from its equilibrium than at the one before, for all steps that are stable at all.
+/// at `a (1 - ω² Δt² / 2)` after it. Steps of one length have places `a cos nθ`, so at no stop is a
+/// mode further from its equilibrium than at the one before, for all steps that are stable at all.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Relaxation {
     /// Kinetic energy of the nodes in the last step, J; 0 once the velocities were set to 0.

@@ -13,7 +13,7 @@ use crate::solver::physics::Physics;
 use crate::solver::state::Solver;
 use crate::solver::state::bookings::FAILED_SUMS;
 
-/// What is done with failed particles, the same for all leaves.
+/// Treatment of failed particles, the same for all leaves.
 pub(super) struct Failures<'a, const D: usize> {
     materials: &'a [Box<dyn Material>],
     /// By material.
@@ -73,7 +73,7 @@ impl<'a, const D: usize> Failures<'a, D> {
         found
     }
 
-    /// What goes with a particle that is deleted.
+    /// Sums that go with a particle that is deleted.
     fn deleted(&self, chunk: &Chunk<D>, p: usize) -> [f64; FAILED_SUMS] {
         let mass = chunk.column(Layout::<D>::MASS)[p];
         let velocity: [f64; D] = chunk.read(Layout::<D>::VELOCITY, p);

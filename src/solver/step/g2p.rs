@@ -490,8 +490,8 @@ impl<const D: usize> Sweep<'_, D> {
         self.fill.map(|_| Filling { flows: &self.flows, means: &means.of_particles })
     }
 
-    /// With F-bar: the rates of the particles of a leaf, and the correction by the mean rate of dilation of each
-    /// cell.
+    /// With F-bar: the rates of the particles of a leaf, and the correction by the mean rate of dilation of
+    /// each cell.
     fn find_dilation(&self, scratch: &mut Scratch<D>, leaf: usize, chunk: &Chunk<D>, bins: &OfLeaf<'_, D>) {
         let Scratch { kernel, arena, gathered, rates, mean_dilation, .. } = scratch;
         for Members { source: Source { fields, arenas, .. }, lists } in self.members(leaf, bins) {

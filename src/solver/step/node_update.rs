@@ -148,7 +148,7 @@ pub struct Faces<'a, const D: usize> {
     pub contacts: &'a [[Contact; 2]; D],
     /// Where the material is; without it all touches.
     pub gaps: Option<Gaps<'a>>,
-    /// What is beyond those that absorb waves.
+    /// The medium beyond those that absorb waves.
     pub absorbing: Option<&'a AbsorbingFaces<D>>,
     /// Velocities of nodes at the start of the step, m/s, where any face absorbs.
     pub start: &'a [Row],
@@ -184,11 +184,10 @@ impl<const D: usize> Physics<D> {
 }
 
 impl Gaps<'_> {
-    /// Bounds on the velocity of a node at `x` (m) on a face with this normal into the domain, of cells of this
-    /// edge, m.
-    /// `cohesion` is the velocity that cohesion over an area of 1 m² (in plane strain 1 m) takes away at
-    /// most, m/s; `drag` is the way of the surface in the step by a velocity of 1 m/s, times the coefficient
-    /// of drag, s.
+    /// Bounds on the velocity of a node at `x` (m) on a face with this normal into the domain, of cells of
+    /// this edge, m. `cohesion` is the velocity that cohesion over an area of 1 m² (in plane strain 1 m)
+    /// takes away at most, m/s; `drag` is the way of the surface in the step by a velocity of 1 m/s, times
+    /// the coefficient of drag, s.
     fn bounds<const D: usize>(
         &self,
         (node, x): (usize, &[f64; D]),

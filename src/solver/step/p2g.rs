@@ -70,8 +70,9 @@ impl<const D: usize> Solver<D> {
         });
     }
 
-    /// Turns the velocity gradients C of a new state into the `B = C D` that APIC keeps. The first particles of
-    /// each own leaf, as many as `done`, already have B, and so have particles of bodies that come with it.
+    /// Turns the velocity gradients C of a new state into the `B = C D` that APIC keeps. The first
+    /// particles of each own leaf, as many as `done`, already have B, and so have particles of bodies that
+    /// come with it.
     pub(in crate::solver) fn moments_from_affine(&mut self, done: &[usize]) -> Result<(), BinMissing> {
         if self.physics.transfer != Transfer::Apic {
             return Ok(());

@@ -1,7 +1,7 @@
 //! How full the pores of particles are: weight and inertia change as the water table passes through them.
 //!
-//! A particle has the mean density of the parts of its box below and above the table. Water that comes or goes
-//! has the velocity of the particle, which stays: what it brings is booked.
+//! A particle has the mean density of the parts of its box below and above the table. Water that comes or
+//! goes has the velocity of the particle, which stays: what it brings is booked.
 use rayon::prelude::*;
 
 use crate::exact_sum::ExactSum;

@@ -112,7 +112,8 @@ pub(super) fn share_motion<const D: usize>(
 }
 
 /// Half width of the undeformed section of the space of a ring, m, whose stretch in the plane of the section
-/// is `e + 1` (see [`crate::particle::strain`]): of one that the stretch makes as large as the ring's section.
+/// is `e + 1` (see [`crate::particle::strain`]): of one that the stretch makes as large as the ring's
+/// section.
 pub(super) fn space<const D: usize>(chunk: &Chunk<D>, setting: &Setting<D>, p: usize, b: &[f64; 6]) -> f64 {
     let [half] = chunk.read(Layout::<D>::HALF, p);
     let ratio = volume_ratio(chunk, p);

@@ -48,8 +48,8 @@ pub(in crate::io::snapshot) struct LeafAverage {
     pub stress: [f64; 6],
 }
 
-/// The average over a leaf of the edge `edge`, m. `around` is the length over which its section stands, m; 1 but
-/// in axisymmetry.
+/// The average over a leaf of the edge `edge`, m. `around` is the length over which its section stands, m; 1
+/// but in axisymmetry.
 pub(in crate::io::snapshot) fn over_leaf<const D: usize>(
     edge: f64,
     around: f64,

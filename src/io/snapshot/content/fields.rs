@@ -80,8 +80,8 @@ fields! {
     };
     /// First history variable of the material, as a rule the accumulated plastic strain.
     PlasticStrain, "plastic_strain", "", |view| scalars(view, plastic_strain);
-    /// Damage, 0 for materials without: of elastic ones the part of the stiffness that cracks have taken, 1 where
-    /// it is broken; of metals plastic strain over failure strain, which fail from 1 on.
+    /// Damage, 0 for materials without: of elastic ones the part of the stiffness that cracks have taken, 1
+    /// where it is broken; of metals plastic strain over failure strain, which fail from 1 on.
     Damage, "damage", "", |view| damages(view);
     /// Mean of the Cauchy stress with the sign changed, Pa; compression is positive.
     Pressure, "pressure", "Pa", |view| scalars(view, |chunk, p| -mean(&cauchy_stress(chunk, p)));

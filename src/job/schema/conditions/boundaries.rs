@@ -28,8 +28,8 @@ pub struct Boundaries {
     #[serde(default)]
     #[schemars(extend("x-dimension" = 3))]
     pub z_max: Option<Face>,
-    /// What happens to particles that leave the domain through a face of another kind than `outflow`; an error by default. Particles that
-    /// cross a face only by rounding are always put back and counted.
+    /// Fate of particles that leave the domain through a face of another kind than `outflow`; an
+    /// error by default. Particles that cross a face only by rounding are always put back and counted.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub leaving: Option<Leaving>,
 }
@@ -42,7 +42,8 @@ pub enum Face {
     Sticky {},
     /// No velocity through the face, no friction.
     Slip {},
-    /// Material may leave the face; Coulomb friction acts while it presses, cohesion and turbulent friction while it touches.
+    /// Material may leave the face; Coulomb friction acts while it presses, cohesion and turbulent friction
+    /// while it touches.
     Separating {
         /// Friction coefficient, the tangent of the friction angle; 0 by default.
         #[serde(default)]
@@ -52,18 +53,19 @@ pub enum Face {
         #[serde(default)]
         #[schemars(range(min = 0.0, max = 1e15))]
         cohesion: f64,
-        /// Voellmy's coefficient ξ of turbulent friction, m/s²: a shear stress of `ρ g v² / ξ` more, with the density ρ and the
-        /// velocity v of the material at the surface and g = 9.80665 m/s². Snow has 400 to 4000; none by default.
+        /// Voellmy's coefficient ξ of turbulent friction, m/s²: a shear stress of `ρ g v² / ξ` more, with
+        /// the density ρ and the velocity v of the material at the surface and g = 9.80665 m/s². Snow has 400
+        /// to 4000; none by default.
         #[schemars(range(min = 1e-3, max = 1e12))]
         turbulent_friction: Option<f64>,
     },
     /// A plane of symmetry.
     Symmetric {},
-    /// An open boundary: no condition on velocities. Particles that cross it leave the run, whatever `leaving` says, and are counted with
-    /// their mass.
+    /// An open boundary: no condition on velocities. Particles that cross it leave the run, whatever
+    /// `leaving` says, and are counted with their mass.
     Outflow {},
-    /// Waves go out, as if the material went on: dashpots in proportion to the velocity (Lysmer and Kuhlemeyer). Alone they
-    /// creep under a lasting stress, so `pressure` holds the material at rest.
+    /// Waves go out, as if the material went on: dashpots in proportion to the velocity (Lysmer and
+    /// Kuhlemeyer). Alone they creep under a lasting stress, so `pressure` holds the material at rest.
     Absorbing {
         /// Speed of compression waves, m/s.
         #[schemars(range(max = 1e6), extend("exclusiveMinimum" = 0.0))]
@@ -74,13 +76,14 @@ pub enum Face {
         /// Density of the material at the face, kg/m³.
         #[schemars(range(min = 1e-6, max = 1e5))]
         density: f64,
-        /// Pressure from beyond the face, Pa: a number, an expression in x, y, z and t, or a table over time; none by default.
+        /// Pressure from beyond the face, Pa: a number, an expression in x, y, z and t, or a table over time;
+        /// none by default.
         #[serde(default)]
         pressure: Quantity,
     },
 }
 
-/// What happens to particles that leave the domain.
+/// Fate of particles that leave the domain.
 #[derive(Clone, Copy, Debug, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Leaving {

@@ -5,8 +5,9 @@ use crate::job::schema::common::{AxisName, Spin, is_off, velocity};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// A rigid body that acts on material, by default on the nodes inside it: then nothing less than two cells thick stops material. Forces, torques and places are columns of `history.csv`: `force_NAME_x` and so on, each force the mean
-/// since the row before.
+/// A rigid body that acts on material, by default on the nodes inside it: then nothing less than two cells
+/// thick stops material. Forces, torques and places are columns of `history.csv`: `force_NAME_x` and so on,
+/// each force the mean since the row before.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Collider {
@@ -14,10 +15,10 @@ pub struct Collider {
     pub name: String,
     /// Initial shape; may extend beyond the domain.
     pub shape: Shape,
-    /// What happens to material that touches it; by default it may leave, without friction.
+    /// Law of contact for material that touches it; by default it may leave, without friction.
     #[serde(default)]
     pub contact: Option<Contact>,
-    /// What it acts on; `nodes` by default.
+    /// Where it acts: on nodes or on particles; `nodes` by default.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub acts_on: Option<ActsOn>,
     /// Motion; fixed by default.
@@ -26,25 +27,28 @@ pub struct Collider {
     /// Meshes that follow that of `shape`, for a collider that deforms.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub frames: Option<Frames>,
-    /// Names of the stages in which it exists; all by default. If given, the times of its motion count from the start of the first of them.
+    /// Names of the stages in which it exists; all by default. If given, the times of its motion count from
+    /// the start of the first of them.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(length(min = 1, max = 20))]
     pub stages: Option<Vec<String>>,
-    /// Centre of its rotation and reference point of its torque, m. By default the centre of mass for a free body whose inertia follows
-    /// from its shape, and otherwise the centre of its bounding box, cut by the domain.
+    /// Centre of its rotation and reference point of its torque, m. By default the centre of mass for a free
+    /// body whose inertia follows from its shape, and otherwise the centre of its bounding box, cut by the
+    /// domain.
     #[serde(default)]
     pub reference: Option<Vector>,
 }
 
-/// Meshes of a surface that deforms. Vertices move on straight lines from one mesh to the next, and stop at the last one. `motion` is
-/// added.
+/// Meshes of a surface that deforms. Vertices move on straight lines from one mesh to the next, and stop at
+/// the last one. `motion` is added.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Frames {
     /// Time between two meshes, s.
     #[schemars(range(max = 1e12), extend("exclusiveMinimum" = 0.0))]
     pub every: f64,
-    /// Names of the files, in the order of time, with the vertices and triangles of the mesh of `shape`, in the same order; `scale`, `origin` and `solid` are those of `shape`.
+    /// Names of the files, in the order of time, with the vertices and triangles of the mesh of `shape`, in
+    /// the same order; `scale`, `origin` and `solid` are those of `shape`.
     #[schemars(length(min = 1, max = 10_000))]
     pub files: Vec<String>,
 }
@@ -62,7 +66,7 @@ pub enum ActsOn {
     Particles,
 }
 
-/// What happens to material that touches a collider.
+/// Law of contact for material that touches a collider.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(tag = "kind", rename_all = "snake_case", deny_unknown_fields)]
 pub enum Contact {
@@ -70,7 +74,8 @@ pub enum Contact {
     Sticky {},
     /// Material slides along the surface without friction and never leaves it.
     Slip {},
-    /// Material may leave the surface; Coulomb friction acts while it presses, cohesion and turbulent friction while it touches.
+    /// Material may leave the surface; Coulomb friction acts while it presses, cohesion and turbulent
+    /// friction while it touches.
     Separating {
         /// Friction coefficient, the tangent of the friction angle; 0 by default.
         #[serde(default)]
@@ -80,8 +85,9 @@ pub enum Contact {
         #[serde(default)]
         #[schemars(range(min = 0.0, max = 1e15))]
         cohesion: f64,
-        /// Voellmy's coefficient ξ of turbulent friction, m/s²: a shear stress of `ρ g v² / ξ` more, with the density ρ and the
-        /// velocity v of the material at the surface and g = 9.80665 m/s². Snow has 400 to 4000; none by default.
+        /// Voellmy's coefficient ξ of turbulent friction, m/s²: a shear stress of `ρ g v² / ξ` more, with
+        /// the density ρ and the velocity v of the material at the surface and g = 9.80665 m/s². Snow has 400
+        /// to 4000; none by default.
         #[schemars(range(min = 1e-3, max = 1e12))]
         turbulent_friction: Option<f64>,
     },
@@ -102,13 +108,14 @@ pub enum Motion {
         /// Angular velocity about the reference point, rad/s: three components in 3D, one number in 2D.
         #[serde(default)]
         angular_velocity: Option<Spin>,
-        /// Time over which it reaches these velocities from rest, s, smoothly, on half a period of a cosine; at once by default.
+        /// Time over which it reaches these velocities from rest, s, smoothly, on half a period of a cosine;
+        /// at once by default.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         #[schemars(range(max = 1e12), extend("exclusiveMinimum" = 0.0))]
         ramp: Option<f64>,
     },
-    /// Prescribed by a table, linear between rows, at rest before the first and after the last one. The velocity in a time step is the mean
-    /// over the step.
+    /// Prescribed by a table, linear between rows, at rest before the first and after the last one. The
+    /// velocity in a time step is the mean over the step.
     Table {
         /// Axis of the rotations, any length; 3D only, z by default.
         #[serde(default)]
@@ -121,16 +128,17 @@ pub enum Motion {
         /// The rows from a file.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         record: Option<MotionRecord>,
-        /// Whether it comes to rest at each row, on half a period of a cosine from one row to the next; the speed then reaches π/2 times
-        /// that of a linear motion.
+        /// Whether it comes to rest at each row, on half a period of a cosine from one row to the next; the
+        /// speed then reaches π/2 times that of a linear motion.
         #[serde(default, skip_serializing_if = "is_off")]
         smooth: bool,
     },
-    /// As a rigid body under gravity and the forces of the material. It should be heavier than the material that it
-    /// touches within a cell of its surface. Unless `collides = false` it collides with the faces of the
-    /// domain, other than `symmetric`, `outflow` and `absorbing` ones, and other colliders.
+    /// As a rigid body under gravity and the forces of the material. It should be heavier than the material
+    /// that it touches within a cell of its surface. Unless `collides = false` it collides with the faces
+    /// of the domain, other than `symmetric`, `outflow` and `absorbing` ones, and other colliders.
     Free {
-        /// Mass, kg; in plane strain of one metre of thickness, of bodies of revolution of the whole. Either this or `density`.
+        /// Mass, kg; in plane strain of one metre of thickness, of bodies of revolution of the whole. Either
+        /// this or `density`.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         #[schemars(range(max = 1e24), extend("exclusiveMinimum" = 0.0))]
         mass: Option<f64>,
@@ -148,33 +156,37 @@ pub enum Motion {
         /// Whether it rotates; by default in 3D, and in 2D if `density` or `inertia` is given.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         turns: Option<bool>,
-        /// A number: moment of inertia about a fixed axis through the reference point, kg m²; in 2D of one metre of thickness. Three
-        /// numbers, in 3D: principal moments about the centre of mass, with x, y and z as principal axes at the start, for a body that turns about any
-        /// axis. By default that of the shape, filled evenly.
+        /// A number: moment of inertia about a fixed axis through the reference point, kg m²; in 2D of one
+        /// metre of thickness. Three numbers, in 3D: principal moments about the centre of mass, with x, y
+        /// and z as principal axes at the start, for a body that turns about any axis. By default that of the
+        /// shape, filled evenly.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         inertia: Option<Inertia>,
-        /// Fixed axis of rotation, any length; 3D only. By default the body rotates about any axis, or about z if `inertia` is a number.
+        /// Fixed axis of rotation, any length; 3D only. By default the body rotates about any axis, or about
+        /// z if `inertia` is a number.
         #[serde(default)]
         #[schemars(extend("x-dimension" = 3))]
         axis: Option<Vector>,
-        /// Angular velocity at the start, rad/s: a number about z or the fixed axis, or three components of a body that turns about any axis; 0 by
-        /// default.
+        /// Angular velocity at the start, rad/s: a number about z or the fixed axis, or three components of a
+        /// body that turns about any axis; 0 by default.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         angular_velocity: Option<Spin>,
         /// Whether it collides with faces of the domain and other colliders; true by default.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         collides: Option<bool>,
-        /// Coefficient of friction in these collisions; between two free bodies the smaller value applies; 0.5 by default. Friction with
-        /// the material is in `contact`.
+        /// Coefficient of friction in these collisions; between two free bodies the smaller value applies;
+        /// 0.5 by default. Friction with the material is in `contact`.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         #[schemars(range(min = 0.0, max = 100.0))]
         friction: Option<f64>,
-        /// Coefficient of restitution in these collisions; between two free bodies the smaller value applies; 0 by default.
+        /// Coefficient of restitution in these collisions; between two free bodies the smaller value applies;
+        /// 0 by default.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         #[schemars(range(min = 0.0, max = 1.0))]
         restitution: Option<f64>,
-        /// Table of its motion along the axes that `along` leaves out, and of its rotation about `axis` where `turns = false`: rows as with
-        /// `kind = "table"`. A wheel that a vehicle drives is free along z alone. It is at rest there by default.
+        /// Table of its motion along the axes that `along` leaves out, and of its rotation about `axis` where
+        /// `turns = false`: rows as with `kind = "table"`. A wheel that a vehicle drives is free along z
+        /// alone. It is at rest there by default.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         #[schemars(length(max = 100_000))]
         rows: Option<Vec<Row>>,
@@ -184,8 +196,9 @@ pub enum Motion {
     },
 }
 
-/// A motion over time from a file with columns separated by semicolons, tabs, commas or spaces. Lines that start with # are comments, and
-/// the first line may hold the names of the columns. If its rows change, a restart is refused.
+/// A motion over time from a file with columns separated by semicolons, tabs, commas or spaces. Lines that
+/// start with # are comments, and the first line may hold the names of the columns. If its rows change, a
+/// restart is refused.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct MotionRecord {
@@ -233,7 +246,8 @@ pub struct Row {
     /// Displacement of the reference point from its initial position, m; 0 by default.
     #[serde(default)]
     pub translation: Option<Vector>,
-    /// Angle from the initial orientation, degrees, counter-clockwise seen against the axis; may exceed a full turn.
+    /// Angle from the initial orientation, degrees, counter-clockwise seen against the axis; may exceed a
+    /// full turn.
     #[serde(default)]
     #[schemars(range(min = -1e9, max = 1e9))]
     pub rotation: f64,

@@ -2,21 +2,23 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Contact between deformable bodies: each moves with its own velocity field, and they meet at their surfaces. Bodies that no contact names
-/// stick where they touch, as if glued. Columns of `history.csv`: the mean force (N) on the first of two sides since the previous row,
-/// `contact_NAME_x` and so on, and the work (J) since the start, `contact_work_NAME`.
+/// Contact between deformable bodies: each moves with its own velocity field, and they meet at their
+/// surfaces. Bodies that no contact names stick where they touch, as if glued. Columns of `history.csv`: the
+/// mean force (N) on the first of two sides since the previous row, `contact_NAME_x` and so on, and the work
+/// (J) since the start, `contact_work_NAME`.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct BodyContact {
     /// Name, of letters, digits, `_` and `-`; by default the number of the contact in the job, from 1.
     #[serde(default)]
     pub name: Option<String>,
-    /// The sides of the contact, each the name of a body or a list of names: bodies on different sides are in contact. By default each body
-    /// is a side. If several contacts name the same pair of bodies, the last one applies.
+    /// The sides of the contact, each the name of a body or a list of names: bodies on different sides are in
+    /// contact. By default each body is a side. If several contacts name the same pair of bodies, the last
+    /// one applies.
     #[serde(default)]
     #[schemars(length(min = 2, max = 250))]
     pub between: Option<Vec<Side>>,
-    /// What happens where they touch.
+    /// Law of contact where they touch.
     #[serde(default)]
     pub kind: PairKind,
     /// Friction coefficient, the tangent of the friction angle; 0 by default. For `separating` only.
@@ -43,7 +45,7 @@ pub enum Side {
     Several(Vec<String>),
 }
 
-/// What happens where bodies touch.
+/// Law of contact where bodies touch.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum PairKind {

@@ -4,16 +4,18 @@ use crate::job::schema::common::yes;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// A quantity: a number; an expression in x, y, z (m) and t (s), of loads on material also in X, Y, Z (m), such as "0.1 * sin(2 * pi * t)"; a table over time,
-/// [[time, value], …] or from a file { file = "record.csv" }, linear between its rows and constant outside; or values at places from a file,
-/// { points = "standpipes.csv" } or { raster = "table.asc" }.
+/// A quantity: a number; an expression in x, y, z (m) and t (s), of loads on material also in X, Y, Z (m),
+/// such as "0.1 * sin(2 * pi * t)"; a table over time, [[time, value], …] or from a file { file =
+/// "record.csv" }, linear between its rows and constant outside; or values at places from a file, { points =
+/// "standpipes.csv" } or { raster = "table.asc" }.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(untagged)]
 pub enum Quantity {
     /// The same everywhere and always.
     Number(#[schemars(range(min = -1e12, max = 1e12))] f64),
-    /// An expression in x, y, z (m), t (s) and, in loads on material, X, Y, Z (m; the place in the undeformed body), with + - * / ^ < > <= >=, pi, and sin, cos, tan, asin, acos, atan, atan2, sinh,
-    /// cosh, tanh, exp, ln, log10, sqrt, abs, sign, step, ramp, floor, ceil, min, max.
+    /// An expression in x, y, z (m), t (s) and, in loads on material, X, Y, Z (m; the place in the undeformed
+    /// body), with + - * / ^ < > <= >=, pi, and sin, cos, tan, asin, acos, atan, atan2, sinh, cosh, tanh,
+    /// exp, ln, log10, sqrt, abs, sign, step, ramp, floor, ceil, min, max.
     Expression(String),
     /// Rows [time (s), value] with increasing times.
     Table(#[schemars(length(max = 100_000), inner(inner(range(min = -1e12, max = 1e12))))] Vec<[f64; 2]>),
@@ -25,8 +27,9 @@ pub enum Quantity {
     Raster(Box<Raster>),
 }
 
-/// A table over time from a file with columns separated by semicolons, tabs, commas or spaces, or a record of the PEER database. Lines that
-/// start with # are comments, and the first line may hold the names of the columns. If its rows change, a restart is refused.
+/// A table over time from a file with columns separated by semicolons, tabs, commas or spaces, or a record of
+/// the PEER database. Lines that start with # are comments, and the first line may hold the names of the
+/// columns. If its rows change, a restart is refused.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Record {
@@ -44,9 +47,10 @@ pub struct Record {
     pub scale: f64,
 }
 
-/// Values at points from a file with columns, as of a table over time. The first line names them: those of the coordinates x, y and z (m) on
-/// which the values depend, and of the values. Points at all combinations of some coordinates are a grid: values between them are linear
-/// along each coordinate. Other points over two coordinates make triangles, with linear values. Outside, the nearest place counts. If the file
+/// Values at points from a file with columns, as of a table over time. The first line names them: those of
+/// the coordinates x, y and z (m) on which the values depend, and of the values. Points at all combinations
+/// of some coordinates are a grid: values between them are linear along each coordinate. Other points over
+/// two coordinates make triangles, with linear values. Outside, the nearest place counts. If the file
 /// changes, a restart is refused.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -65,16 +69,16 @@ pub struct Points {
     pub origin: Option<Vector>,
 }
 
-/// Values at x and y from a raster that covers the domain, every cell with a value; linear between the middles of its cells. If the file
-/// changes, a restart is refused.
+/// Values at x and y from a raster that covers the domain, every cell with a value; linear between the
+/// middles of its cells. If the file changes, a restart is refused.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Raster {
-    /// Name of an ESRI ASCII grid (`.asc`), a GeoTIFF (`.tif`) or an array of NumPy (`.npy`, `.npz`), rows from north to south; relative to
-    /// the job file.
+    /// Name of an ESRI ASCII grid (`.asc`), a GeoTIFF (`.tif`) or an array of NumPy (`.npy`, `.npz`), rows
+    /// from north to south; relative to the job file.
     pub raster: String,
-    /// Distance of neighbouring values, m: for arrays, which do not have it, or in place of that of the file; the south-western value then
-    /// stands at the origin of the raster's coordinates.
+    /// Distance of neighbouring values, m: for arrays, which do not have it, or in place of that of the file;
+    /// the south-western value then stands at the origin of the raster's coordinates.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(range(max = 1e9), extend("exclusiveMinimum" = 0.0))]
     pub cell: Option<f64>,
@@ -118,18 +122,21 @@ impl Default for Quantity {
     }
 }
 
-/// A load: what acts on the material beside gravity, contact and the faces of the domain. Body forces, grips and damping act in their
-/// shape at all times; tractions, pressures and point forces on the material that lies there at the start, wherever it goes.
-/// Its mean force (N) since the row before and its work (J) since the start are columns of `history.csv`.
+/// A load: what acts on the material beside gravity, contact and the faces of the domain. Body forces, grips
+/// and damping act in their shape at all times; tractions, pressures and point forces on the material that
+/// lies there at the start, wherever it goes. Its mean force (N) since the row before and its work (J) since
+/// the start are columns of `history.csv`.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 pub struct Load {
     /// Name, of letters, digits, `_` and `-`.
     pub name: String,
-    /// Where the load acts; everywhere by default. A traction or a pressure acts on the part of the bodies' surfaces that lies in the shape
-    /// or on its surface. Material at a face of the domain or against another body has no surface there.
+    /// Where the load acts; everywhere by default. A traction or a pressure acts on the part of the bodies'
+    /// surfaces that lies in the shape or on its surface. Material at a face of the domain or against another
+    /// body has no surface there.
     #[serde(default)]
     pub shape: Option<Shape>,
-    /// Names of the stages in which it acts; all by default. If given, all times of the load count from the start of the first of them.
+    /// Names of the stages in which it acts; all by default. If given, all times of the load count from the
+    /// start of the first of them.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(length(min = 1, max = 20))]
     pub stages: Option<Vec<String>>,
@@ -189,7 +196,8 @@ pub enum LoadKind {
         /// Bodies whose surfaces count; all by default.
         #[serde(default)]
         bodies: Option<Vec<String>>,
-        /// Restricts the load to surface whose outward normal at the start is within 45° of this vector; all by default.
+        /// Restricts the load to surface whose outward normal at the start is within 45° of this vector; all
+        /// by default.
         #[serde(default)]
         facing: Option<Vector>,
     },
@@ -203,7 +211,8 @@ pub enum LoadKind {
         /// Bodies whose surfaces count; all by default.
         #[serde(default)]
         bodies: Option<Vec<String>>,
-        /// Restricts the load to surface whose outward normal at the start is within 45° of this vector; all by default.
+        /// Restricts the load to surface whose outward normal at the start is within 45° of this vector; all
+        /// by default.
         #[serde(default)]
         facing: Option<Vector>,
     },

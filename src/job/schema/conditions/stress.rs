@@ -5,12 +5,13 @@ use crate::job::schema::common::is_off;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Initial stress of a body. The elastic strain is set to the one that produces this stress; a stress outside the yield surface is refused,
-/// or returns to it with `relax`. Vertical is the axis of `gravity` at the start.
+/// Initial stress of a body. The elastic strain is set to the one that produces this stress; a stress outside
+/// the yield surface is refused, or returns to it with `relax`. Vertical is the axis of `gravity` at the
+/// start.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 pub struct Stress {
-    /// Overconsolidation ratio: preconsolidation pressure over that of the yield surface through the stress; 1 is normally
-    /// consolidated. For models with `preconsolidation_pressure`, in place of it.
+    /// Overconsolidation ratio: preconsolidation pressure over that of the yield surface through the stress;
+    /// 1 is normally consolidated. For models with `preconsolidation_pressure`, in place of it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 1.0, max = 1e6))]
     pub ocr: Option<f64>,
@@ -18,8 +19,9 @@ pub struct Stress {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(range(max = 1e13), extend("exclusiveMinimum" = 0.0))]
     pub preconsolidation: Option<f64>,
-    /// Whether a stress outside the yield surface returns to it, as the material yields in one step; then it is not that of the weight above, and
-    /// the ground moves until it carries it. By default such a stress is an error.
+    /// Whether a stress outside the yield surface returns to it, as the material yields in one step; then it
+    /// is not that of the weight above, and the ground moves until it carries it. By default such a stress is
+    /// an error.
     #[serde(default, skip_serializing_if = "is_off")]
     pub relax: bool,
     /// Kind of initial stress.
@@ -35,8 +37,8 @@ pub enum StressKind {
     Geostatic {
         /// Horizontal over vertical stress, K0; a number or an expression in x, y, z.
         k0: Quantity,
-        /// Level of the surface, m, along the vertical axis: a number or an expression in the horizontal coordinates. By default
-        /// it is found: all bodies above count, with their densities.
+        /// Level of the surface, m, along the vertical axis: a number or an expression in the horizontal
+        /// coordinates. By default it is found: all bodies above count, with their densities.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         surface: Option<Quantity>,
         /// Pressure on the surface, Pa; 0 by default.
@@ -54,14 +56,16 @@ pub enum StressKind {
     },
     /// A table over depth, linear between its rows and constant outside.
     Depth {
-        /// Rows [depth (m), vertical pressure (Pa), horizontal pressure (Pa)] with increasing depths; compression is positive.
+        /// Rows [depth (m), vertical pressure (Pa), horizontal pressure (Pa)] with increasing depths;
+        /// compression is positive.
         #[schemars(transform = limited)]
         table: Vec<[f64; 3]>,
         /// Level of depth 0, m, as for `geostatic`; by default that of the uppermost body.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         surface: Option<Quantity>,
     },
-    /// Components of the Cauchy stress, Pa, tension positive: numbers or expressions in x, y, z; 0 by default.
+    /// Components of the Cauchy stress, Pa, tension positive: numbers or expressions in x, y, z; 0 by
+    /// default.
     Components {
         /// Normal stress along x.
         #[serde(default)]

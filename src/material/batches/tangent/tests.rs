@@ -52,8 +52,8 @@ fn is_corner(model: &str, state: &str) -> bool {
             let is_shocked = has("eos");
             is_dry || has("mu_i") || is_consolidated || is_shocked || (has("'fluid'") && !has("tension"))
         }
-        // The greatest of three equal stresses cracks; the strength that is left at an apex falls with the norm
-        // of the shear.
+        // The greatest of three equal stresses cracks; the strength that is left at an apex falls with the
+        // norm of the shear.
         "stretched evenly" => has("rankine") || ((has("mohr") || has("drucker")) && has("hardening")),
         // The deviator shrinks to an edge, instead of along it.
         _ => has_two && has("radial"),

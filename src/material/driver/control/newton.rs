@@ -30,8 +30,8 @@ fn slopes(at: &Controlled) -> [[f64; 6]; 6] {
     })
 }
 
-/// From one state of a compressed material to another far away, with shear and a prescribed stress across. Near
-/// the end the errors of the stress, as a share of Young's modulus, square until rounding ends them.
+/// From one state of a compressed material to another far away, with shear and a prescribed stress across.
+/// Near the end the errors of the stress, as a share of Young's modulus, square until rounding ends them.
 #[test]
 fn newton_with_tangents_converges_quadratically() {
     for model in [

@@ -7,8 +7,8 @@
 //! p + p_∞ = (p_0 + p_∞) e^s J^-γ,   ρ_0 e = W = (p_0 + p_∞) e^s J^(1-γ)/(γ-1) + p_∞ J,   p = -∂W/∂J at s
 //! ```
 //! so gas that is compressed and widened without heat comes back to its pressure whatever the steps, and heat
-//! h per reference volume, that of artificial viscosity, adds `ln(1 + h/T)` to s, where T is the first part of
-//! W: the energy grows by h to round-off.
+//! h per reference volume, that of artificial viscosity, adds `ln(1 + h/T)` to s, where T is the first part
+//! of W: the energy grows by h to round-off.
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

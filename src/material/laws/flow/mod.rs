@@ -17,8 +17,8 @@ use crate::material::State;
 use crate::simd::math::exp;
 use crate::simd::{Vector, VectorMask};
 
-/// Leaves of the elastic tensor its volume, with this trace of the strain and norm of its deviator: matter that
-/// flows has no memory of shear. A particle that is not sheared keeps its bits.
+/// Leaves of the elastic tensor its volume, with this trace of the strain and norm of its deviator: matter
+/// that flows has no memory of shear. A particle that is not sheared keeps its bits.
 #[inline(always)]
 fn forget_shear<V: Vector>(state: &mut State<V>, trace: V, norm: V) {
     let zero = V::splat(0.0);

@@ -45,8 +45,8 @@ impl<const D: usize> Solver<D> {
         self.grid.solids = all;
     }
 
-    /// `Σ w F` and `Σ w A` over these nodes at the copies of particles, leaf by leaf. The sums at the nodes stay:
-    /// faces and colliders read them next.
+    /// `Σ w F` and `Σ w A` over these nodes at the copies of particles, leaf by leaf. The sums at the
+    /// nodes stay: faces and colliders read them next.
     fn at_particles<'a>(
         &mut self,
         solids: &mut Solids<D>,

@@ -1,5 +1,5 @@
-//! Numbers that follow the motion of their particle: displacements, areas of loads, total strains, and the ways
-//! and turns over which forces on particles do work.
+//! Numbers that follow the motion of their particle: displacements, areas of loads, total strains, and the
+//! ways and turns over which forces on particles do work.
 use crate::kernel::g2p::rates::Rates;
 use crate::load::{Carried, cofactor};
 use crate::particle::chunk::Chunk;

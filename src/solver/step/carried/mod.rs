@@ -1,6 +1,6 @@
-//! Forces on particles: those that they carry (tractions, pressures, point forces), that of the water in their
-//! pores, and body forces that belong to places of the undeformed body. With mass scaling gravity and all
-//! body forces are among them: they act on the mass of the material, not on the scaled mass.
+//! Forces on particles: those that they carry (tractions, pressures, point forces), that of the water in
+//! their pores, and body forces that belong to places of the undeformed body. With mass scaling gravity and
+//! all body forces are among them: they act on the mass of the material, not on the scaled mass.
 //!
 //! A particle's force f goes to the nodes with the weights of its mass: `p_j += w Δt f`. So for P2G the
 //! particle has the velocity `v + Δt f / m`, and its own again afterwards: the force passes through parts of
@@ -173,8 +173,8 @@ impl<const D: usize> Pushing<'_, D> {
         before
     }
 
-    /// Volume (m³) of a particle of this mass (kg) where its material has its density. Water that comes as pores
-    /// open, and goes as they close, bears its own weight, so that of grains under water stays.
+    /// Volume (m³) of a particle of this mass (kg) where its material has its density. Water that comes as
+    /// pores open, and goes as they close, bears its own weight, so that of grains under water stays.
     fn volume_of_mass(&self, chunk: &Chunk<D>, p: usize, mass: f64) -> f64 {
         let [density, saturated] = self.densities[usize::from(Tag::unpack(chunk.tags()[p]).material)];
         let full = self.saturation.and_then(|column| chunk.carried(column).get(p).copied()).unwrap_or(0.0);

@@ -34,8 +34,8 @@ pub(super) struct Behind<const D: usize> {
 }
 
 impl<const D: usize> Solver<D> {
-    /// Not collective. The real nodes of the first velocity field that have mass and are behind the surface of
-    /// a collider that acts on particles, in the order of blocks, colliders and nodes.
+    /// Not collective. The real nodes of the first velocity field that have mass and are behind the surface
+    /// of a collider that acts on particles, in the order of blocks, colliders and nodes.
     pub(super) fn nodes_behind(&mut self) -> Vec<Behind<D>> {
         let (physics, states) = (&self.physics, &self.contacts.states);
         let (plan, fields) = (&self.grid.plan, &self.grid.fields);

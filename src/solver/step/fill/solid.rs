@@ -42,7 +42,7 @@ pub(super) fn add_solids<const D: usize>(
 /// much everywhere: contact keeps boxes outside, and to drive them off as well would compress the fluid.
 const INSIDE: f64 = 0.005;
 
-/// What the fill of nodes inside colliders exceeds 1 by.
+/// Excess over 1 of the fill of nodes inside colliders.
 const EDGE: f64 = 0.5;
 
 /// Excess of fill for each cell that a node lies deeper, beyond the first.
@@ -55,10 +55,10 @@ const OWN: f64 = 0.25;
 /// How full the open part of a basis function is, from how much of all of it the material fills.
 ///
 /// Down to the share of an inner corner that lies on a node this is what a face of the domain there would
-/// give. Were the space of colliders to count as full instead, the same excess of material would weigh less at
-/// nodes of a wall than away from it, and shifts would drive fluid into walls. At nodes with less open space
-/// the rest up to that share counts as full. Where none is open, the fill rises inwards from the surface: a
-/// row of boxes that has sunk into a wall leaves no other node overfull, but must come out.
+/// give. Were the space of colliders to count as full instead, the same excess of material would weigh less
+/// at nodes of a wall than away from it, and shifts would drive fluid into walls. At nodes with less open
+/// space the rest up to that share counts as full. Where none is open, the fill rises inwards from the
+/// surface: a row of boxes that has sunk into a wall leaves no other node overfull, but must come out.
 fn fill_of_open<const D: usize>(value: f64, open: f64) -> f64 {
     let (least, share) = (0.5f64.powi(D as i32), open.max(0.0));
     if share >= least {

@@ -1,9 +1,9 @@
 //! Nodes that colliders hold themselves, not at their feet.
 //!
 //! These are the nodes inside `sticky` colliders for solids that have come to the surface, those inside all
-//! colliders for what yields, if a fluid moves with it or other surfaces have laws by area, and those behind a
-//! surface that another collider covers or comes near to. Feet of both surfaces would be in one cell, and if
-//! the colliders move against each other, no velocity of its corners obeys both.
+//! colliders for what yields, if a fluid moves with it or other surfaces have laws by area, and those behind
+//! a surface that another collider covers or comes near to. Feet of both surfaces would be in one cell, and
+//! if the colliders move against each other, no velocity of its corners obeys both.
 use rayon::prelude::*;
 
 use crate::boundary::motion::Rate;

@@ -47,14 +47,14 @@ pub(super) struct LeafFeet<const D: usize> {
     /// Bin of the leaf's own level.
     pub bin: usize,
     pub feet: Vec<Foot<D>>,
-    /// What holds at each foot; none at those of deep nodes.
+    /// Condition at each foot; none at those of deep nodes.
     pub touching: Vec<Option<Touching<D>>>,
 }
 
 impl<const D: usize> LeafFeet<D> {
-    /// Those in own leaf number `leaf` of colliders that act at feet, whose nodes `inside` says by block. A foot on a face
-    /// between leaves is in the upper one. The node of each foot is at most two cells away, so the arena has
-    /// it.
+    /// Those in own leaf number `leaf` of colliders that act at feet, whose nodes `inside` says by block. A
+    /// foot on a face between leaves is in the upper one. The node of each foot is at most two cells away, so
+    /// the arena has it.
     pub(super) fn find<'a>(
         plan: &GridPlan<D>,
         leaf: usize,

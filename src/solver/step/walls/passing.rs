@@ -28,7 +28,8 @@ impl<'a, const D: usize> Barrier<'a, D> {
         Self { physics, extent }
     }
 
-    /// Whether it holds a particle with this tag. If its material does not move over gaps, no sum lets it through.
+    /// Whether it holds a particle with this tag. If its material does not move over gaps, no sum lets it
+    /// through.
     fn holds(&self, tag: u64) -> bool {
         let body = usize::from(Tag::unpack(tag).body);
         let field = self.physics.body_contacts.field_of_body.get(body).map_or(0, |&field| field.into());

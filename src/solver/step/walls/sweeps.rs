@@ -18,7 +18,7 @@ use crate::solver::state::inside::{Inside, Plane};
 use crate::solver::step::colliders::Touch;
 use crate::solver::step::contact::sweeps::for_real_nodes;
 
-/// What a deep node counts for a foot that is lighter than it: more than a node has feet.
+/// Weight of a deep node for a foot that is lighter than it: more than a node has feet.
 const HEAVY: f64 = 64.0;
 
 /// By leaf with feet and by foot, the sum of the weights of corners that have mass.
@@ -68,7 +68,7 @@ impl<const D: usize> Grid<D> {
     }
 }
 
-/// What is known of colliders at the nodes of a block that has any of them inside.
+/// Colliders at the nodes of a block that has any of them inside.
 fn of_block<'a, const D: usize>(
     inside: &'a [Vec<Option<Inside<D>>>],
     has_feet: &[bool],
