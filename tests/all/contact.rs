@@ -200,7 +200,8 @@ fn blocks_slide_down_inclines_in_the_plane() {
 }
 
 #[test]
-fn blocks_slide_down_inclines_in_space() {
+#[ignore = "nightly: half a minute; in the plane they slide always"]
+fn blocks_slide_down_inclines_in_space_nightly() {
     blocks_slide_as_coulomb_says(3, &[Incline::Face], &[0.65]);
     blocks_slide_as_coulomb_says(3, &[Incline::HalfSpace], &[0.3]);
     blocks_slide_as_coulomb_says(3, &[Incline::Mesh], &[0.1]);

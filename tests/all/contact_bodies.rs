@@ -137,7 +137,8 @@ fn oblique_disks_leave_as_finite_elements_say() {
 /// that of rims that rub, -0.0126. Disks on a lattice are not quite round, and each job for itself is off by
 /// ± 0.004, so that the mean over some places of the lattice counts.
 #[test]
-fn disks_without_friction_do_not_rub() {
+#[ignore = "nightly: four jobs of ten seconds"]
+fn disks_without_friction_do_not_rub_nightly() {
     const PLACES: i32 = 4;
     let (mut spin, mut aside) = (0.0, 0.0);
     for number in 0..PLACES {

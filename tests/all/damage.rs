@@ -82,7 +82,8 @@ fn notched_beam(coarse: f64, is_refined: bool) -> (String, [f64; 2], f64) {
 /// moment in its middle is that of a cohesive crack between finite elements (independent code: 50424 N/m with
 /// arms of 93.75 mm) within 5 %, and the crack takes the energy of its ligament within 10 %.
 #[test]
-fn a_notched_beam_breaks_as_a_cohesive_crack_does() {
+#[ignore = "nightly: a minute; a bar breaks always"]
+fn a_notched_beam_breaks_as_a_cohesive_crack_does_nightly() {
     for (coarse, is_refined) in [(0.025, false), (0.025, true), (0.0125, false)] {
         let directory = tempfile::tempdir().expect("temporary directory");
         let (job, [left, right], fine) = notched_beam(coarse, is_refined);

@@ -167,7 +167,8 @@ fn water_at_rest_fills_its_volume_in_tanks_of_colliders() {
 }
 
 #[test]
-fn water_at_rest_fills_its_volume_on_finer_cells() {
+#[ignore = "nightly: half a minute; on coarser cells always"]
+fn water_at_rest_fills_its_volume_on_finer_cells_nightly() {
     Slosh { level: 3, ..Slosh::default() }.comes_to_rest();
 }
 
@@ -187,7 +188,7 @@ fn fluids_slosh_with_the_same_bits_on_any_ranks_and_across_a_restart() {
          motion = { kind = 'steady', velocity = [-0.2, 0] }\n\
          [adaptivity]\nevery_steps = 5\n[[adaptivity.criteria]]\nkind = 'free_surface'\nlevel = 3\n\
          [checkpoint]\nevery_steps = 80\nkeep = 9\n[history]\nevery_steps = 10\n";
-    let slosh = Slosh { end: 0.4, more: more.into(), ..Slosh::default() };
+    let slosh = Slosh { end: 0.2, more: more.into(), ..Slosh::default() };
     restart::assert_same_on_any_ranks(&slosh.job(), "slosh", |directory, _| {
         let history = History::read(directory, "slosh");
         assert!(history.last("shift_work") != 0.0 && history.last("splits") > 0.0);

@@ -30,7 +30,8 @@ fn limit(f_bar: bool) -> f64 {
 
 /// Prandtl: `(2 + π) c`. Without F-bar flow at constant volume locks.
 #[test]
-fn clay_bears_what_limit_analysis_says() {
+#[ignore = "nightly: a minute; undrained soil on the same footing runs always"]
+fn clay_bears_what_limit_analysis_says_nightly() {
     let exact = 2.0 + std::f64::consts::PI;
     let (with, without) = (limit(true) / exact - 1.0, limit(false) / exact - 1.0);
     println!("B/20: {:+.1} % with F-bar, {:+.1} % without", 100.0 * with, 100.0 * without);
