@@ -220,12 +220,12 @@ impl<const D: usize> Solver<D> {
     pub(super) fn rebuild_grid(&mut self, reach: u32) {
         self.balance.sent_before = self.traffic();
         // Fresh memory costs as much as the first scatter into it.
-        let (arenas, sum_bytes) = (std::mem::take(&mut self.grid.arenas), self.grid.sum_bytes);
+        let (arenas, sum_bytes) = (std::mem::take(&mut self.grid.fields[0].arenas), self.grid.sum_bytes);
         let inside = KnownInside::of(&self.grid.plan, std::mem::take(&mut self.grid.inside_still));
         // Free the old grid first: both at once would double the peak of memory.
         self.grid.clear();
         self.grid = Grid::build(&self.comm, &self.forest, &self.physics, reach);
-        (self.grid.arenas, self.grid.sum_bytes) = (arenas, sum_bytes);
+        (self.grid.fields[0].arenas, self.grid.sum_bytes) = (arenas, sum_bytes);
         self.grid.inside_still = inside.for_plan(&self.grid.plan);
     }
 

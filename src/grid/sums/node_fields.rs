@@ -21,7 +21,7 @@ use crate::memory::Block;
 pub(super) const ZERO: Row = Row([0.0; 4]);
 
 /// Rows of all blocks of a plan: momentum and mass after the sums, velocity after the update.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct NodeFields<const D: usize> {
     /// One row per node, block by block. Those of blocks without contributions take no memory.
     pub rows: Block<Row>,

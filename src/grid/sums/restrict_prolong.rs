@@ -48,19 +48,22 @@ impl<const D: usize> NodeFields<D> {
     /// parents, coarsest level first: `v_j = Σ c v_i`, `V_j = Σ c (V_i + v_i ⊗ (x_i - x_j))`, with `V = 0` on
     /// real nodes.
     pub fn prolong(&mut self, plan: &GridPlan<D>, arenas: &Arenas<D>) {
+        self.begin_prolong(plan, arenas);
+        prolong(plan, &self.needed, &mut self.rows, &mut self.moments);
+    }
+
+    /// Not collective. Prolongation of these rows of all nodes in place of those of the fields. The moments of
+    /// the fields become theirs.
+    pub fn prolong_rows(&mut self, plan: &GridPlan<D>, arenas: &Arenas<D>, rows: &mut [Row]) {
+        self.begin_prolong(plan, arenas);
+        prolong(plan, &self.needed, rows, &mut self.moments);
+    }
+
+    /// Marks the blocks that the gather reads, and those among them that will differ from zero.
+    fn begin_prolong(&mut self, plan: &GridPlan<D>, arenas: &Arenas<D>) {
         self.mark_needed(plan, arenas);
-        for level in 1..plan.levels() {
-            let links = &plan.links[level];
-            let steps = Step::<D>::of_all(plan.cell(level as u8));
-            let needed = &self.needed;
-            let (from, to) = split(&mut self.rows, &mut self.moments, plan, level);
-            let fine = links.fine.iter().filter(|fine| needed[fine.block as usize]);
-            for_each_linked(to, plan, fine.map(|fine| (fine.block, fine)), |mut to, fine| {
-                interpolate(plan, &steps, &from, fine, &mut to);
-            });
-            for fine in &links.fine {
-                self.dirty[fine.block as usize] |= self.needed[fine.block as usize];
-            }
+        for fine in plan.links.iter().skip(1).flat_map(|links| &links.fine) {
+            self.dirty[fine.block as usize] |= self.needed[fine.block as usize];
         }
     }
 
@@ -159,6 +162,19 @@ fn hand_up<const D: usize>(
                 moments::write(to.moments, *passing, parent.bit.into(), &sums);
             }
         }
+    }
+}
+
+/// Interpolates the constrained nodes of the needed blocks from their parents, coarsest level first.
+fn prolong<const D: usize>(plan: &GridPlan<D>, needed: &[bool], rows: &mut [Row], moments: &mut [Row]) {
+    for level in 1..plan.levels() {
+        let links = &plan.links[level];
+        let steps = Step::<D>::of_all(plan.cell(level as u8));
+        let (from, to) = split(rows, moments, plan, level);
+        let fine = links.fine.iter().filter(|fine| needed[fine.block as usize]);
+        for_each_linked(to, plan, fine.map(|fine| (fine.block, fine)), |mut to, fine| {
+            interpolate(plan, &steps, &from, fine, &mut to);
+        });
     }
 }
 

@@ -13,7 +13,7 @@ impl<const D: usize> Solver<D> {
             // The tree has just changed; nothing was transferred on it yet.
             return Kind::Plain;
         }
-        match grid.lists.of_leaf(leaf) {
+        match grid.fields[0].lists.of_leaf(leaf) {
             Some(bins) if !bins.cut.is_empty() => Kind::Cut,
             Some(_) => Kind::Jump,
             None if grid.plan.bins[grid.plan.leaf_bins(leaf).start].touched.is_some() => Kind::Jump,

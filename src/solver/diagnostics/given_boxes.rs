@@ -18,6 +18,7 @@ use crate::particle::lanes::values;
 use crate::simd::{Lanes, Vector};
 use crate::solver::physics::{Physics, StepControl, Ties};
 use crate::solver::sorting::box_widths::{BinMissing, BoxWidths};
+use crate::solver::state::grid::Grid;
 use crate::solver::state::{Clock, Solver};
 use crate::solver::step::node_update::update_velocity;
 
@@ -167,7 +168,9 @@ impl<const D: usize> GivenBoxes<D> {
     pub fn to_nodes(&mut self, dt: f64) -> Result<(), BinMissing> {
         let solver = &mut self.solver;
         let widths = (&self.halves, solver.physics.coordinates);
-        let sorted = solver.grid.sort(&mut solver.phases, &solver.chunks, widths, None);
+        let Grid { plan, fields, exchange, .. } = &mut solver.grid;
+        let on = (&*plan, &exchange.seam);
+        let sorted = fields[0].sort(on, &mut solver.phases, &solver.chunks, widths, None);
         solver.nodes_from_particles(dt);
         sorted
     }
@@ -176,7 +179,7 @@ impl<const D: usize> GivenBoxes<D> {
     /// each node has one owner.
     pub fn real_nodes(&self) -> Vec<RealNode<D>> {
         let grid = &self.solver.grid;
-        let rows = grid.fields.rows.chunks(block_nodes(D));
+        let rows = grid.fields[0].nodes.rows.chunks(block_nodes(D));
         let mut nodes = Vec::new();
         for (block, rows) in grid.plan.blocks.iter().zip(rows) {
             for bit in bits(block.owned) {
@@ -210,8 +213,8 @@ impl<const D: usize> GivenBoxes<D> {
     /// Not collective. Velocities of all nodes from momentum and mass, without forces and walls.
     pub fn to_velocities(&mut self) {
         let solver = &mut self.solver;
-        update_velocity(&mut solver.grid.fields, &solver.grid.plan, [0.0; D], 0.0);
-        solver.prolong();
+        update_velocity(&mut solver.grid.fields[0].nodes, &solver.grid.plan, [0.0; D], 0.0);
+        solver.prolong(0);
     }
 
     /// Not collective. G2P without moving anything: particles take velocity and affine state of the nodes.

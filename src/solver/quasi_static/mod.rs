@@ -134,7 +134,7 @@ impl<const D: usize> Solver<D> {
         let mut pulls = Vec::new();
         let mut outer = Vec::with_capacity(unknowns.nodes.len());
         for (number, (&node, x)) in unknowns.nodes.iter().zip(&unknowns.places).enumerate() {
-            let Row(row) = self.grid.fields.rows[node as usize];
+            let Row(row) = self.grid.fields[0].nodes.rows[node as usize];
             let mut force: [f64; D] = std::array::from_fn(|a| row[3].mul_add(gravity[a], row[a]));
             for &(load, at) in active.iter().filter(|(_, load)| load.reaches(x)) {
                 let mut acceleration = [0.0; D];
@@ -217,13 +217,13 @@ impl<const D: usize> Solver<D> {
         dt: f64,
     ) -> Result<Moved, StepError> {
         let to = self.clock.time + dt;
-        let rows = &mut self.grid.fields.rows;
+        let rows = &mut self.grid.fields[0].nodes.rows;
         for ((&node, &mass), way) in unknowns.nodes.iter().zip(&unknowns.masses).zip(way) {
             let mut row = [0.0, 0.0, 0.0, mass];
             (0..D).for_each(|a| row[a] = way[a] / dt);
             rows[node as usize] = Row(row);
         }
-        self.prolong();
+        self.prolong(0);
         let departed = self.nodes_to_particles(rates, to, dt);
         self.book_pushes(Lengths { kick: dt, drift: dt });
         self.chunks.iter_mut().for_each(stop);

@@ -10,6 +10,7 @@ use super::points::{Points, Sweep};
 use super::unknowns::{Nodal, Unknowns};
 use super::walls::Springs;
 use crate::kernel::{Row, Scheme};
+use crate::solver::state::grid::Grid;
 use crate::solver::state::inside::dot;
 use crate::solver::state::{Effort, Solver};
 use crate::solver::step::p2g::scatter;
@@ -238,13 +239,13 @@ impl<const D: usize> Solver<D> {
 
     /// Gives all nodes displacements, constrained ones those of their parents.
     fn show(&mut self, unknowns: &Unknowns<D>, way: &Nodal<D>) {
-        let rows = &mut self.grid.fields.rows;
+        let rows = &mut self.grid.fields[0].nodes.rows;
         for (&node, way) in unknowns.nodes.iter().zip(way) {
             let mut row = [0.0; 4];
             row[..D].copy_from_slice(way);
             rows[node as usize] = Row(row);
         }
-        self.prolong();
+        self.prolong(0);
     }
 
     /// Collective over neighbours. Forces of the particles' affine columns on the nodes; `note` gets the sum
@@ -252,10 +253,11 @@ impl<const D: usize> Solver<D> {
     pub(super) fn forces(&mut self, unknowns: &Unknowns<D>, mut note: impl FnMut(f64, f64)) -> Nodal<D> {
         let (chunks, times) = (&self.chunks, &self.leaf_data.times);
         let scheme = Scheme { forces: true, ..self.physics.scheme() };
-        self.grid.scatter_and_sum(&mut self.phases, chunks, |scratch, bin, arena| {
+        let Grid { plan, fields, exchange, .. } = &mut self.grid;
+        fields[0].scatter_and_sum((plan, exchange), &mut self.phases, chunks, |scratch, bin, arena| {
             times.time(bin.leaf, || scatter(scratch, bin, chunks, &scheme, 1.0, arena));
         });
-        let rows = &self.grid.fields.rows;
+        let rows = &fields[0].nodes.rows;
         let all = unknowns.nodes.iter().zip(&unknowns.cells).map(|(&node, &cell)| {
             let row = rows[node as usize].0;
             note(row[3], cell);

@@ -23,6 +23,7 @@ use crate::particle::chunk::{Layout, TILE, Tag};
 use crate::simd::{LANES, Lanes, Vector, VectorMask};
 use crate::solver::state::Solver;
 use crate::solver::state::phases::Phase;
+use crate::solver::state::velocity_field::VelocityField;
 use crate::solver::step::look::Look;
 use crate::solver::step::mean_dilation::MeanDilation;
 
@@ -152,8 +153,8 @@ impl<const D: usize> Solver<D> {
     /// stiffness, Pa m³. Returns whether all states are sound.
     pub(super) fn stress_of_displacements(&mut self, points: &mut [Vec<Points>], sweep: Sweep) -> bool {
         let (physics, plan) = (&self.physics, &self.grid.plan);
-        let (scheme, lists) = (physics.scheme(), &self.grid.lists);
-        let look = Look { plan, fields: &self.grid.fields, arenas: &self.grid.arenas, scheme: &scheme };
+        let (scheme, VelocityField { nodes, arenas, lists, .. }) = (physics.scheme(), &self.grid.fields[0]);
+        let look = Look { plan, fields: nodes, arenas, scheme: &scheme };
         let leaves = self.chunks.par_iter_mut().zip(points).zip(self.forest.leaves()).enumerate();
         self.phases.time(Phase::Gather, || {
             let sound = leaves.map_init(Scratch::default, |scratch: &mut Scratch<D>, (leaf, all)| {

@@ -18,6 +18,7 @@ use crate::load::Kind;
 use crate::quantity::in_job;
 use crate::solver::physics::Physics;
 use crate::solver::state::Solver;
+use crate::solver::state::grid::Grid;
 use crate::solver::state::inside::{Asked, Inside, dot};
 use rayon::prelude::*;
 use rustc_hash::FxHashMap;
@@ -249,22 +250,19 @@ impl<const D: usize> Solver<D> {
     /// Collective over neighbours. The unknowns of a step of length `dt` (s): real nodes whose rows have
     /// mass.
     pub(super) fn unknowns(&mut self, rates: &[Rate<D>], dt: f64) -> Unknowns<D> {
-        let mut ties = self.grid.ties.take();
-        if let Some(ties) = &mut ties {
-            self.fill_cells(ties, 0);
-        }
-        let (grid, physics) = (&self.grid, &self.physics);
-        let (plan, rows) = (&grid.plan, &grid.fields.rows);
-        let nodes = block_nodes(D);
+        self.fill_cells(0);
+        let (Grid { plan, fields, ties, .. }, physics) = (&mut self.grid, &self.physics);
+        let (fields, nodes) = (&fields[0].nodes, block_nodes(D));
+        let rows = &fields.rows;
         let mut unknowns = Unknowns::empty();
         let mut numbers = vec![NONE; rows.len()];
         let middle = 0.5f64.mul_add(dt, self.clock.time);
         let colliders = physics.colliders.iter().zip(&self.contacts.states).zip(rates).enumerate();
         let colliders: Vec<_> =
             colliders.filter(|(_, ((collider, _), _))| collider.acts_on_nodes()).collect();
-        let active = plan.blocks.iter().enumerate().filter(|(index, _)| grid.fields.active[*index]);
+        let active = plan.blocks.iter().enumerate().filter(|(index, _)| fields.active[*index]);
         for (index, block) in active {
-            let filled = grid.fields.with_mass(index, block.real_nodes(), 0.0);
+            let filled = fields.with_mass(index, block.real_nodes(), 0.0);
             let inside: Vec<u64> = colliders
                 .iter()
                 .map(|(_, ((collider, state), _))| {
@@ -314,8 +312,8 @@ impl<const D: usize> Solver<D> {
             }
         }
         unknowns.hold_at_walls();
-        if let Some(ties) = &mut ties {
-            let tied: Tied = ties.search(plan, &grid.fields, |_, _| 0);
+        if let Some(ties) = ties {
+            let tied: Tied = ties.search(plan, fields, |_, _| 0);
             let number = |node: usize| numbers[node] as usize;
             let all = tied.iter().map(|(node, corners)| {
                 (number(node), corners.iter().map(|c| (number(c.node), c.weight)).collect())
@@ -323,7 +321,6 @@ impl<const D: usize> Solver<D> {
             unknowns.ties = all.collect();
         }
         unknowns.tie_slivers(physics.coordinates);
-        self.grid.ties = ties;
         unknowns
     }
 }

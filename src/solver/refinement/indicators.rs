@@ -14,7 +14,7 @@ impl<const D: usize> Solver<D> {
         let criteria = &adaptivity.criteria;
         let (mut beside_empty, mut masses) = (Vec::new(), Vec::new());
         let together = self.grid.fields_together();
-        let fields = together.as_ref().unwrap_or(&self.grid.fields);
+        let fields = together.as_ref().unwrap_or(&self.grid.fields[0].nodes);
         let surroundings = &mut self.adaptation.cache.surroundings;
         if adaptivity.needs().exposure {
             surroundings.update(&self.forest, &self.grid.plan);

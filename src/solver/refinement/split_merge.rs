@@ -35,7 +35,7 @@ impl<const D: usize> Solver<D> {
     pub(super) fn turns(&self) -> Vec<RetrySlot> {
         let every = self.physics.adaptivity.as_ref().map_or(1, |adaptivity| adaptivity.every);
         let regrid = self.clock.step / every;
-        let (lists, root_edge) = (&self.grid.lists, self.physics.root_edge);
+        let (lists, root_edge) = (&self.grid.fields[0].lists, self.physics.root_edge);
         let is_of_tree = self.grid.plan.revision == self.forest.revision();
         let leaves = self.forest.leaves().iter().enumerate();
         let each = leaves.map(|(number, leaf)| {
@@ -89,7 +89,7 @@ impl<const D: usize> Solver<D> {
         let limits = self.physics.adaptivity.as_ref().and_then(|a| a.merge);
         let Some((resampling, limits)) = resampling.zip(limits) else { return Vec::new() };
         let (turns, root_edge) = (self.turns(), self.physics.root_edge);
-        let (plan, lists) = (&self.grid.plan, &self.grid.lists);
+        let (plan, lists) = (&self.grid.plan, &self.grid.fields[0].lists);
         let leaves = self.chunks.par_iter_mut().zip(self.forest.leaves()).enumerate().with_min_len(8);
         let done: Vec<(Merged, Vec<f64>)> = leaves
             .map(|(number, (chunk, leaf)): (usize, (&mut Chunk<D>, &Octant<D>))| {

@@ -42,9 +42,9 @@ impl<const D: usize> Solver<D> {
         let is_covered =
             |x: &[f64; D]| covers.iter().any(|(collider, state)| collider.distance(x, &state.pose) <= 0.0);
         phases.time(Phase::Nodes, || {
-            let Grid { plan, exchange, received, seam, .. } = grid;
+            let Grid { plan, exchange, .. } = grid;
             let mut ground = Ground::of(plan, seepage, chunks, physics.coordinates);
-            let mut nodes = Nodes::new(comm, plan, (exchange, received), seam, &ground);
+            let mut nodes = Nodes::new(comm, plan, exchange, &ground);
             let mut heads = Heads::new(&mut nodes, &ground, &held, is_covered);
             let all = heads.held(comm, count);
             let is_found = heads.find(&mut nodes, &mut ground);

@@ -5,12 +5,11 @@ use rayon::prelude::*;
 use super::ground::{Ground, GroundLeaf};
 use crate::grid::arenas::Arenas;
 use crate::grid::arenas::arena_schedule::FIRST;
-use crate::grid::sums::exchange::ArenaExchange;
 use crate::grid::sums::node_fields::load_rows;
-use crate::grid::sums::received::ReceivedSums;
-use crate::grid::{GridPlan, NodeFields, Seam, Window};
+use crate::grid::{GridPlan, NodeFields, Window};
 use crate::kernel::{Row, arena_nodes};
 use crate::particle::Chunk;
+use crate::solver::state::velocity_field::NodeExchange;
 
 /// Node fields for the ground: one for sums, one for values.
 pub(super) struct Nodes<'a, const D: usize> {
@@ -22,8 +21,7 @@ pub(super) struct Nodes<'a, const D: usize> {
 
 /// Sums over the cells of the ground, and the exchange that completes them.
 struct Sums<'a, const D: usize> {
-    exchange: &'a mut ArenaExchange<D>,
-    received: &'a mut ReceivedSums<D>,
+    exchange: &'a mut NodeExchange<D>,
     arenas: Arenas<D>,
     fields: NodeFields<D>,
 }
@@ -38,13 +36,12 @@ impl<'a, const D: usize> Nodes<'a, D> {
     pub(super) fn new(
         comm: &'a Comm,
         plan: &'a GridPlan<D>,
-        (exchange, received): (&'a mut ArenaExchange<D>, &'a mut ReceivedSums<D>),
-        seam: &Seam,
+        exchange: &'a mut NodeExchange<D>,
         ground: &Ground<D>,
     ) -> Self {
         let mut arenas = Arenas::default();
-        arenas.occupy(plan, seam, ground.leaves.iter().map(|leaf| (leaf.bin, window())));
-        let sums = Sums { exchange, received, arenas, fields: NodeFields::new(plan) };
+        arenas.occupy(plan, &exchange.seam, ground.leaves.iter().map(|leaf| (leaf.bin, window())));
+        let sums = Sums { exchange, arenas, fields: NodeFields::new(plan) };
         Self { comm, plan, sums, values: NodeFields::new(plan) }
     }
 
@@ -125,12 +122,14 @@ impl<const D: usize> Sums<'_, D> {
         scatter: impl Fn(&GroundLeaf<D>, &mut Vec<Row>, &mut [Row]) + Sync,
     ) -> &[Row] {
         self.wave(plan, ground, FIRST, &scatter);
-        let pending = self.exchange.begin(self.exchange.pack(plan, &self.arenas, &self.fields));
+        let sums = &mut self.exchange.arenas;
+        let pending = sums.begin(sums.pack(plan, &self.arenas, &self.fields));
         for wave in FIRST + 1..self.arenas.schedule().count() {
             self.wave(plan, ground, wave, &scatter);
         }
-        self.exchange.finish(pending, self.received);
-        self.fields.add_received(plan, &self.arenas, self.received);
+        let NodeExchange { arenas: sums, received, .. } = &mut *self.exchange;
+        sums.finish(pending, received);
+        self.fields.add_received(plan, &self.arenas, received);
         self.fields.restrict(plan);
         &self.fields.rows
     }

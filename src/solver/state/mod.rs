@@ -3,7 +3,8 @@
 //! | file | what it holds |
 //! |---|---|
 //! | [`parts`] | sums, forces on particles, measures, equilibrium, adaptation, balance |
-//! | [`grid`] | plan, arenas, fields and exchanges of one tree and partition |
+//! | [`grid`] | plan, velocity fields and exchanges of one tree and partition |
+//! | `velocity_field` | what particles scatter into and gather from |
 //! | `inside` | nodes inside colliders, and the surfaces that they are behind |
 //! | `walls` | nodes near surfaces that hold material back |
 //! | [`bookings`] | states and reactions of colliders; impulse and work of loads |
@@ -42,6 +43,7 @@ pub mod phases;
 pub(super) mod regrid_cache;
 pub mod regrid_timers;
 pub mod relaxation;
+pub(super) mod velocity_field;
 pub(super) mod walls;
 
 /// Why a step failed on this rank.

@@ -72,7 +72,7 @@ impl<const D: usize> Solver<D> {
 
     /// Keeps the arenas of a step until the next, for measurements.
     pub fn keep_arenas(&mut self) {
-        self.grid.arenas.keep();
+        self.grid.fields[0].arenas.keep();
     }
 
     /// The grid of the current tree and partition.
@@ -83,12 +83,13 @@ impl<const D: usize> Solver<D> {
     /// Not collective. Records the data of the surface between partitions, while the arenas are those of the
     /// present tree.
     pub(in crate::solver) fn note_surface(&mut self) {
-        self.balance.surface_bytes = surface_bytes(&self.grid.exchange, &self.grid.plan, &self.grid.arenas);
+        let Grid { plan, fields, exchange, .. } = &self.grid;
+        self.balance.surface_bytes = surface_bytes(&exchange.arenas, plan, &fields[0].arenas);
     }
 
     /// Collective. Parts of the tree on this rank, and messages of its last exchange.
     pub fn statistics(&self) -> Statistics {
-        let (tree, exchange) = (&self.grid.plan.tree, &self.grid.exchange);
+        let (tree, exchange) = (&self.grid.plan.tree, &self.grid.exchange.arenas);
         Statistics {
             leaves: self.forest.leaves().len() as u64,
             ghost_leaves: tree.ghost_len() as u64,

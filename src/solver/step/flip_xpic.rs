@@ -12,10 +12,13 @@ use rayon::prelude::*;
 
 use super::node_update::{Faces, apply_faces, update_velocity};
 use crate::kernel::{Row, Transfer};
+use crate::memory::Block;
 use crate::particle::Chunk;
 use crate::particle::chunk::Layout;
 use crate::solver::state::Solver;
+use crate::solver::state::grid::Grid;
 use crate::solver::state::phases::Phase;
+use crate::solver::state::velocity_field::{Increments, VelocityField};
 
 /// `to -= from`.
 fn subtract(to: &mut [Row], from: &[Row]) {
@@ -27,74 +30,68 @@ fn subtract(to: &mut [Row], from: &[Row]) {
 }
 
 impl<const D: usize> Solver<D> {
-    /// Before P2G: velocities of the nodes without the impulse of stress, for transfers and for loads that
-    /// need them.
-    pub(in crate::solver) fn note_velocities(&mut self) {
+    /// Before P2G: velocities of the nodes of a velocity field without the impulse of stress, for transfers and
+    /// for loads that need them.
+    pub(in crate::solver) fn note_velocities(&mut self, field: usize) {
         let time = self.clock.time;
         let absorbs = self.physics.absorbing.as_flattened().iter().any(Option::is_some);
         let damps = self.physics.loads.iter().any(|load| load.needs_start() && load.is_active(time));
         let is_needed = absorbs || damps;
         if is_needed {
-            self.scatter_velocities();
-            self.grid.increments.start.clone_from(&self.grid.fields.rows);
+            self.scatter_velocities(field);
+            let VelocityField { nodes, increments, .. } = &mut self.grid.fields[field];
+            increments.start.clone_from(&nodes.rows);
         }
-        let sweeps = match self.physics.transfer {
+        let order = match self.physics.transfer {
             Transfer::Apic | Transfer::Tpic => return,
-            Transfer::Flip { .. } => 0,
-            Transfer::Xpic { order } => order.max(1) - 1,
+            Transfer::Flip { .. } => None,
+            Transfer::Xpic { order } => Some(order),
         };
-        let mut base = std::mem::take(&mut self.grid.increments.base);
-        if self.physics.transfer == (Transfer::Xpic { order: 1 }) {
-            base.resize(self.grid.fields.rows.len());
-            base.fill(Row::default());
-        } else {
-            if !is_needed {
-                self.scatter_velocities();
-            }
-            base.clone_from(&self.grid.fields.rows);
+        if order != Some(1) && !is_needed {
+            self.scatter_velocities(field);
         }
-        if sweeps > 0 {
-            let mut rest = base.clone();
-            base.fill(Row::default());
-            for _ in 0..sweeps {
-                self.grid.fields.rows.copy_from_slice(&rest);
-                self.prolong();
-                let mut other = self.interpolate();
-                self.swap_velocities(&mut other);
-                self.scatter_velocities();
-                self.swap_velocities(&mut other);
-                subtract(&mut rest, &self.grid.fields.rows);
-                subtract(&mut base, &rest);
-            }
+        let VelocityField { nodes, increments: Increments { base, .. }, .. } = &mut self.grid.fields[field];
+        let Some(order) = order else { return base.clone_from(&nodes.rows) };
+        base.resize(nodes.rows.len());
+        base.fill(Row::default());
+        let mut rest = if order > 1 { nodes.rows.clone() } else { Block::default() };
+        for _ in 1..order {
+            self.grid.fields[field].nodes.rows.copy_from_slice(&rest);
+            self.prolong(field);
+            let mut other = self.interpolate(field);
+            self.swap_velocities(&mut other);
+            self.scatter_velocities(field);
+            self.swap_velocities(&mut other);
+            let VelocityField { nodes, increments, .. } = &mut self.grid.fields[field];
+            subtract(&mut rest, &nodes.rows);
+            subtract(&mut increments.base, &rest);
         }
-        self.grid.increments.base = base;
     }
 
-    /// After the update: what the nodes give to particles, prolonged like velocities.
+    /// After the update: what the nodes of a velocity field give to particles, prolonged like velocities.
     pub(in crate::solver) fn form_increments(&mut self, field: usize) {
         if !self.physics.transfer.has_increments() {
             return;
         }
-        let grid = &mut self.grid;
-        grid.increments.rows.clone_from(&grid.fields.rows);
-        subtract(&mut grid.increments.rows, &grid.increments.base);
-        std::mem::swap(&mut grid.fields.rows, &mut grid.increments.rows);
+        let Grid { plan, fields, walls, solids, .. } = &mut self.grid;
+        let VelocityField { nodes, arenas, increments, .. } = &mut fields[field];
+        let Increments { base, rows, .. } = increments;
+        rows.clone_from(&nodes.rows);
+        subtract(rows, base);
         if matches!(self.physics.transfer, Transfer::Xpic { .. }) {
             // These are velocities, which the filter may have turned towards a wall.
-            let gaps = self.physics.gaps(&grid.walls, &grid.solids, field);
+            let gaps = self.physics.gaps(walls, solids, field);
             let faces = Faces::without_absorption(&self.physics.faces, gaps);
-            apply_faces(&mut grid.fields, &grid.plan, &faces, |_, _, _| ());
+            apply_faces((rows, &nodes.active), plan, &faces, |_, _, _| ());
         }
-        self.prolong();
-        let grid = &mut self.grid;
-        std::mem::swap(&mut grid.fields.rows, &mut grid.increments.rows);
+        self.phases.time(Phase::Nodes, || nodes.prolong_rows(plan, arenas, rows));
     }
 
     /// S⁺: velocities of the nodes from those of the particles alone.
-    fn scatter_velocities(&mut self) {
-        self.field_from_particles(0.0);
-        let grid = &mut self.grid;
-        self.phases.time(Phase::Nodes, || update_velocity(&mut grid.fields, &grid.plan, [0.0; D], 0.0));
+    fn scatter_velocities(&mut self, field: usize) {
+        self.field_from_particles(field, 0.0);
+        let Grid { plan, fields, .. } = &mut self.grid;
+        self.phases.time(Phase::Nodes, || update_velocity(&mut fields[field].nodes, plan, [0.0; D], 0.0));
     }
 
     /// Exchanges the velocities of all particles with those given, leaf by leaf.

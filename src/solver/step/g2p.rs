@@ -30,9 +30,10 @@ use crate::solver::sorting::box_bounds::Widths;
 use crate::solver::sorting::leaf_bins::{self, LeafBins};
 use crate::solver::state::Solver;
 use crate::solver::state::bookings::{FAILED_SUMS, Near, ParticlePush, SourcePush, Struck};
-use crate::solver::state::grid::{Grid, VelocityField};
+use crate::solver::state::grid::Grid;
 use crate::solver::state::leaf_data::LeafData;
 use crate::solver::state::phases::Phase;
+use crate::solver::state::velocity_field::VelocityField;
 use crate::solver::step::carried::follow::{
     add_ways, follow_areas, follow_strain, note_turns, note_ways, positions,
 };
@@ -100,7 +101,7 @@ struct Sweep<'a, const D: usize> {
     dt: f64,
     scheme: &'a Scheme<'a>,
     plan: &'a GridPlan<D>,
-    /// The velocity field of all particles; where there are others, of those of the first group.
+    /// The first velocity field.
     first: Source<'a, D>,
     /// The other velocity fields, with the lists of their particles.
     others: Vec<(Source<'a, D>, &'a BinLists<D>)>,
@@ -136,7 +137,7 @@ struct Sweep<'a, const D: usize> {
 /// A velocity field from which particles gather.
 #[derive(Clone, Copy)]
 struct Source<'a, const D: usize> {
-    fields: &'a NodeFields<D>,
+    nodes: &'a NodeFields<D>,
     arenas: &'a Arenas<D>,
     /// Changes of velocity (FLIP) or new velocities of particles (XPIC) on the nodes.
     increments: Option<&'a [Row]>,
@@ -144,8 +145,8 @@ struct Source<'a, const D: usize> {
 
 impl<'a, const D: usize> Source<'a, D> {
     fn of(field: &'a VelocityField<D>, has_increments: bool) -> Self {
-        let VelocityField { fields, arenas, increments, .. } = field;
-        Self { fields, arenas, increments: has_increments.then_some(&*increments.rows) }
+        let VelocityField { nodes, arenas, increments, .. } = field;
+        Self { nodes, arenas, increments: has_increments.then_some(&*increments.rows) }
     }
 }
 
@@ -196,12 +197,15 @@ impl<const D: usize> Solver<D> {
         let flows = self.physics.flows(self.clock.time, dt);
         let LeafData { signal, maxima, shifts, shocks, struck, failed, places, times } = &mut self.leaf_data;
         let has_increments = scheme.transfer.has_increments();
-        let Grid { plan, fields, arenas, increments, others, lists, migration, fill, .. } = &mut self.grid;
+        let Grid { plan, fields, migration, fill, .. } = &mut self.grid;
+        let (first, others) = fields.split_at_mut(1);
+        // Its lists are sorted for the next step while those of the others are read.
+        let VelocityField { nodes, arenas, increments, lists } = &mut first[0];
         let sweep = Sweep {
             dt,
             scheme: &scheme,
             plan,
-            first: Source { fields, arenas, increments: has_increments.then_some(&*increments.rows) },
+            first: Source { nodes, arenas, increments: has_increments.then_some(&*increments.rows) },
             others: others.iter().map(|field| (Source::of(field, has_increments), &field.lists)).collect(),
             borders: &migration.borders,
             resampling: resampling.as_ref(),
@@ -255,48 +259,48 @@ impl<const D: usize> Solver<D> {
         departed
     }
 
-    /// S: velocities of the nodes of the first field at its particles, leaf by leaf; 0 for those of others.
-    pub(super) fn interpolate(&mut self) -> Vec<Vec<[f64; D]>> {
+    /// S: velocities of the nodes of a velocity field at its particles, leaf by leaf; 0 for those of others.
+    pub(super) fn interpolate(&mut self, field: usize) -> Vec<Vec<[f64; D]>> {
+        let Grid { plan, fields, .. } = &self.grid;
+        let VelocityField { nodes, lists, .. } = &fields[field];
         let scheme = self.physics.scheme();
-        let (plan, rows, lists) = (&self.grid.plan, &self.grid.fields.rows, &self.grid.lists);
-        let chunks = &self.chunks;
-        self.phases.time(Phase::Gather, || {
-            let leaves = chunks.par_iter().enumerate();
-            let all = leaves.map_init(Scratch::default, |scratch: &mut Scratch<D>, (leaf, chunk)| {
-                let (has_members, lists) = (lists.has_members(leaf), lists.of_leaf(leaf));
-                let cut = cut_of(lists);
-                scratch.begin_cut(cut.len());
-                let Scratch { kernel, increments: arena, gathered, .. } = scratch;
-                let mut velocities = vec![[0.0; D]; chunk.len()];
-                if !has_members {
-                    return velocities;
-                }
-                for bin in BinView::of_leaf(plan, lists, leaf, chunk.len()) {
-                    load_rows(plan, bin.number, &bin.window, rows, arena);
-                    let nodes = Fields { velocity: arena, increment: None, fill: None, moments: None };
-                    g2p::gather_sub_boxes(
-                        kernel,
-                        chunk,
-                        bin.parts,
-                        &bin.frame,
-                        scheme.coordinates,
-                        &nodes,
-                        gathered,
-                    );
-                    if let Some(whole) = bin.whole {
-                        g2p::interpolate(kernel, chunk, whole, &bin.frame, &scheme, arena, |p, v| {
-                            velocities[p] = v;
-                        });
-                    }
-                }
-                for (&p, gathered) in cut.iter().zip(&*gathered) {
-                    velocities[p as usize] = gathered.velocity();
-                }
-                velocities
-            });
-            all.collect()
-        })
+        self.phases.time(Phase::Gather, || interpolate(plan, (lists, &nodes.rows), &self.chunks, &scheme))
     }
+}
+
+/// Values of nodes, given by their rows, at the particles in lists, leaf by leaf; 0 for others.
+pub(super) fn interpolate<const D: usize>(
+    plan: &GridPlan<D>,
+    (lists, rows): (&BinLists<D>, &[Row]),
+    chunks: &[Chunk<D>],
+    scheme: &Scheme<'_>,
+) -> Vec<Vec<[f64; D]>> {
+    let leaves = chunks.par_iter().enumerate();
+    let all = leaves.map_init(Scratch::default, |scratch: &mut Scratch<D>, (leaf, chunk)| {
+        let (has_members, lists) = (lists.has_members(leaf), lists.of_leaf(leaf));
+        let cut = cut_of(lists);
+        scratch.begin_cut(cut.len());
+        let Scratch { kernel, increments: arena, gathered, .. } = scratch;
+        let mut velocities = vec![[0.0; D]; chunk.len()];
+        if !has_members {
+            return velocities;
+        }
+        for bin in BinView::of_leaf(plan, lists, leaf, chunk.len()) {
+            load_rows(plan, bin.number, &bin.window, rows, arena);
+            let nodes = Fields { velocity: arena, increment: None, fill: None, moments: None };
+            g2p::gather_sub_boxes(kernel, chunk, bin.parts, &bin.frame, scheme.coordinates, &nodes, gathered);
+            if let Some(whole) = bin.whole {
+                g2p::interpolate(kernel, chunk, whole, &bin.frame, scheme, arena, |p, v| {
+                    velocities[p] = v;
+                });
+            }
+        }
+        for (&p, gathered) in cut.iter().zip(&*gathered) {
+            velocities[p as usize] = gathered.velocity();
+        }
+        velocities
+    });
+    all.collect()
 }
 
 impl<const D: usize> Sweep<'_, D> {
@@ -441,7 +445,7 @@ impl<const D: usize> Sweep<'_, D> {
         chunk: &mut Chunk<D>,
     ) -> f64 {
         let Scratch { kernel, arena, increments, fill, gathered, leavers, mean_dilation, .. } = scratch;
-        let next = source.fields.load(self.plan, source.arenas, bin.number, &bin.window, arena);
+        let next = source.nodes.load(self.plan, source.arenas, bin.number, &bin.window, arena);
         if let Some(rows) = source.increments {
             load_rows(self.plan, bin.number, &bin.window, rows, increments);
         }
@@ -494,8 +498,8 @@ impl<const D: usize> Sweep<'_, D> {
     /// each cell.
     fn find_dilation(&self, scratch: &mut Scratch<D>, leaf: usize, chunk: &Chunk<D>, bins: &OfLeaf<'_, D>) {
         let Scratch { kernel, arena, gathered, rates, mean_dilation, .. } = scratch;
-        for Members { source: Source { fields, arenas, .. }, lists } in self.members(leaf, bins) {
-            let look = Look { plan: self.plan, fields, arenas, scheme: self.scheme };
+        for Members { source: Source { nodes, arenas, .. }, lists } in self.members(leaf, bins) {
+            let look = Look { plan: self.plan, fields: nodes, arenas, scheme: self.scheme };
             look.at_leaf((kernel, arena, gathered), lists, leaf, chunk, |p, gathered| {
                 rates.note(p, gathered)
             });

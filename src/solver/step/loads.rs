@@ -8,7 +8,9 @@ use crate::leapfrog::Lengths;
 use crate::load::Load;
 use crate::solver::state::Solver;
 use crate::solver::state::bookings::ForceAndWork;
+use crate::solver::state::grid::Grid;
 use crate::solver::state::phases::Phase;
+use crate::solver::state::velocity_field::VelocityField;
 
 /// Impulse of a load on one node in one step.
 pub(in crate::solver) struct Push<const D: usize> {
@@ -61,9 +63,9 @@ fn apply<const D: usize>(
 }
 
 impl<const D: usize> Solver<D> {
-    /// Not collective. Applies loads to the velocities of real nodes. Returns their impulses, for
-    /// [`Solver::book_loads`].
-    pub(in crate::solver) fn apply_loads(&mut self, lengths: Lengths) -> Vec<Push<D>> {
+    /// Not collective. Applies loads to the velocities of the real nodes of a velocity field. Returns their
+    /// impulses, for [`Solver::book_loads`].
+    pub(in crate::solver) fn apply_loads(&mut self, field: usize, lengths: Lengths) -> Vec<Push<D>> {
         let time = self.clock.time;
         let scaled = self.physics.has_scaled_masses();
         let loads = self.physics.loads.iter().enumerate();
@@ -72,19 +74,20 @@ impl<const D: usize> Solver<D> {
         if active.is_empty() {
             return Vec::new();
         }
-        let grid = &mut self.grid;
+        let Grid { plan, fields, .. } = &mut self.grid;
+        let VelocityField { nodes, increments, .. } = &mut fields[field];
         self.phases.time(Phase::Nodes, || {
             // The pass ahead of a regrid takes no time, and no force acts in it.
-            let start = if lengths.kick > 0.0 { &grid.increments.start[..] } else { &[] };
-            apply(&mut grid.fields, start, &grid.plan, &active, (time, lengths))
+            let start = if lengths.kick > 0.0 { &increments.start[..] } else { &[] };
+            apply(nodes, start, plan, &active, (time, lengths))
         })
     }
 
-    /// Not collective. Adds impulse and work of the loads to their sums, once nodes have their final
-    /// velocities.
-    pub(in crate::solver) fn book_loads(&mut self, pushes: &[Push<D>]) {
+    /// Not collective. Adds impulse and work of the loads on a velocity field to their sums, once its nodes
+    /// have their final velocities.
+    pub(in crate::solver) fn book_loads(&mut self, field: usize, pushes: &[Push<D>]) {
         for push in pushes {
-            let row = &self.grid.fields.rows[push.node].0;
+            let row = &self.grid.fields[field].nodes.rows[push.node].0;
             let sums = &mut self.sums.loads.of[push.load];
             for a in 0..D {
                 sums[a].add(push.impulse[a]);

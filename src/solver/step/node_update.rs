@@ -14,8 +14,9 @@ use crate::solver::physics::Physics;
 use crate::solver::sorting::box_widths::BinMissing;
 use crate::solver::state::Solver;
 use crate::solver::state::bookings::SUMS;
-use crate::solver::state::grid::Solids;
+use crate::solver::state::grid::{Grid, Solids};
 use crate::solver::state::phases::Phase;
+use crate::solver::state::velocity_field::VelocityField;
 use crate::solver::state::walls::Walls;
 
 impl<const D: usize> Solver<D> {
@@ -38,30 +39,29 @@ impl<const D: usize> Solver<D> {
         let is_step = lengths.drift > 0.0;
         let occupied = self.occupied();
         let mut pushes = Vec::new();
-        self.for_each_field(|solver, field| {
-            let grid = &mut solver.grid;
-            solver
-                .phases
-                .time(Phase::Nodes, || update_velocity(&mut grid.fields, &grid.plan, gravity, lengths.kick));
-            pushes.push(solver.apply_loads(lengths));
-            solver.tie_surface(field, &occupied);
-        });
+        for field in 0..self.grid.fields.len() {
+            let Grid { plan, fields, .. } = &mut self.grid;
+            let nodes = &mut fields[field].nodes;
+            self.phases.time(Phase::Nodes, || update_velocity(nodes, plan, gravity, lengths.kick));
+            pushes.push(self.apply_loads(field, lengths));
+            self.tie_surface(field, &occupied);
+        }
         let meets = self.meeting_nodes(is_step);
         let mut held = self.find_surfaces(&meets, lengths);
         self.press_bodies(&meets, held.is_ok(), lengths);
         let mut impulses = self.no_impulses();
-        self.for_each_field(|solver, field| {
-            solver.hold_at_nodes(field, rates, &mut impulses);
-            solver.apply_faces(field, lengths, is_step);
-            solver.hold_at_feet(field, rates, &mut impulses);
-            if is_step && solver.has_contact_at_particles() {
-                let of_field = solver.hold_particles(field, lengths, rates, &mut impulses);
+        for (field, pushes) in pushes.iter().enumerate() {
+            self.hold_at_nodes(field, rates, &mut impulses);
+            self.apply_faces(field, lengths, is_step);
+            self.hold_at_feet(field, rates, &mut impulses);
+            if is_step && self.has_contact_at_particles() {
+                let of_field = self.hold_particles(field, lengths, rates, &mut impulses);
                 held = held.and(of_field);
             }
             if is_step {
-                solver.book_loads(&pushes[field]);
+                self.book_loads(field, pushes);
             }
-        });
+        }
         if is_step {
             self.note_motion();
         }
@@ -73,24 +73,25 @@ impl<const D: usize> Solver<D> {
     /// this rank counts, if these are needed. Faces that absorb waves take the impulse of the kick.
     pub(super) fn apply_faces(&mut self, field: usize, lengths: Lengths, is_step: bool) {
         let Physics { faces, absorbing, origin, .. } = &self.physics;
-        let (grid, middle) = (&mut self.grid, lengths.middle_of_kick(self.clock.time));
-        let solids = std::mem::take(&mut grid.solids);
-        let gaps = self.physics.gaps(&grid.walls, &solids, field);
-        let (contacts, absorbing, start) = (faces, Some(absorbing), &grid.increments.start[..]);
+        let middle = lengths.middle_of_kick(self.clock.time);
+        let Grid { plan, fields, walls, solids, .. } = &mut self.grid;
+        let VelocityField { nodes, increments, .. } = &mut fields[field];
+        let gaps = self.physics.gaps(walls, solids, field);
+        let (contacts, absorbing, start) = (faces, Some(absorbing), &increments.start[..]);
         let faces = Faces { contacts, gaps, absorbing, start, origin: *origin, middle, kick: lengths.kick };
-        let (plan, sums) = (&grid.plan, &mut self.sums.faces.of);
+        let on = (&mut nodes.rows[..], &nodes.active[..]);
+        let sums = &mut self.sums.faces.of;
         self.phases.time(Phase::Nodes, || {
             if sums.is_empty() || !is_step {
-                return apply_faces(&mut grid.fields, plan, &faces, |_, _, _| ());
+                return apply_faces(on, plan, &faces, |_, _, _| ());
             }
-            apply_faces(&mut grid.fields, plan, &faces, |face, node, impulse: [f64; D]| {
+            apply_faces(on, plan, &faces, |face, node, impulse: [f64; D]| {
                 let (block, bit) = (node / block_nodes(D), node % block_nodes(D));
                 if plan.blocks[block].owned >> bit & 1 == 1 {
                     sums[face].iter_mut().zip(impulse).for_each(|(sum, value)| sum.add(value));
                 }
             });
         });
-        self.grid.solids = solids;
     }
 
     /// Collective. Mean force on each face of the domain since the last row of the history, N: lower and
@@ -104,16 +105,15 @@ impl<const D: usize> Solver<D> {
     /// Not collective. `v_j = Σ c v_i` on constrained nodes from their parents; with FLIP and XPIC the
     /// increments alike.
     pub(in crate::solver) fn prolong_velocities(&mut self) {
-        self.for_each_field(|solver, field| {
-            solver.form_increments(field);
-            solver.prolong();
-        });
+        for field in 0..self.grid.fields.len() {
+            self.form_increments(field);
+            self.prolong(field);
+        }
     }
 
-    /// Not collective. Interpolates the rows of constrained nodes from those of real nodes.
-    pub(in crate::solver) fn prolong(&mut self) {
-        let grid = &mut self.grid;
-        self.phases.time(Phase::Nodes, || grid.fields.prolong(&grid.plan, &grid.arenas));
+    /// Not collective. Interpolates the rows of constrained nodes of a velocity field from those of real nodes.
+    pub(in crate::solver) fn prolong(&mut self, field: usize) {
+        self.grid.fields[field].prolong(&self.grid.plan, &mut self.phases);
     }
 }
 
@@ -215,18 +215,16 @@ impl<'a, const D: usize> Faces<'a, D> {
     }
 }
 
-/// Applies the conditions of the domain's faces to the real nodes on them, axis by axis. `note` receives
-/// face, node and the impulse of the node on the face, kg m/s.
+/// Applies the conditions of the domain's faces to the rows of the real nodes on them in active blocks, axis by
+/// axis. `note` receives face, node and the impulse of the node on the face, kg m/s.
 pub fn apply_faces<const D: usize>(
-    fields: &mut NodeFields<D>,
+    (rows, active): (&mut [Row], &[bool]),
     plan: &GridPlan<D>,
     faces: &Faces<'_, D>,
     mut note: impl FnMut(usize, usize, [f64; D]),
 ) {
-    for &(node, on) in
-        plan.face_nodes.iter().filter(|(node, _)| fields.active[*node as usize / block_nodes(D)])
-    {
-        let row = &mut fields.rows[node as usize].0;
+    for &(node, on) in plan.face_nodes.iter().filter(|(node, _)| active[*node as usize / block_nodes(D)]) {
+        let row = &mut rows[node as usize].0;
         let mut velocity: [f64; D] = std::array::from_fn(|axis| row[axis]);
         for axis in 0..D {
             for (side, inward) in [1.0, -1.0].into_iter().enumerate() {

@@ -10,6 +10,7 @@ use crate::particle::chunk::{Layout, Place, Tag};
 use crate::solver::sorting::bin_view::BinView;
 use crate::solver::sorting::box_widths::BinMissing;
 use crate::solver::state::Solver;
+use crate::solver::state::grid::Grid;
 
 impl<const D: usize> Solver<D> {
     /// The bin of each box: the finest level that it overlaps; boxes wider than a cell of that level are cut.
@@ -18,27 +19,14 @@ impl<const D: usize> Solver<D> {
     /// # Errors
     /// A box that needs a bin outside the plan, on the rank that has it.
     pub(in crate::solver) fn sort_into_bins(&mut self) -> Result<(), BinMissing> {
-        let mut sorted = Ok(());
-        self.for_each_field(|solver, field| {
-            let group = solver.physics.group(field);
-            let widths = solver.physics.widths(&solver.grid.plan);
-            let widths = (&widths, solver.physics.coordinates);
-            let of_field = solver.grid.sort(&mut solver.phases, &solver.chunks, widths, group.as_ref());
-            sorted = sorted.and(of_field);
-        });
-        sorted
-    }
-
-    /// Calls `work` with each velocity field in the place of the first, and its number.
-    pub(in crate::solver) fn for_each_field(&mut self, mut work: impl FnMut(&mut Self, usize)) {
-        work(self, 0);
-        let mut others = std::mem::take(&mut self.grid.others);
-        for (number, other) in others.iter_mut().enumerate() {
-            self.grid.swap(other);
-            work(self, number + 1);
-            self.grid.swap(other);
-        }
-        self.grid.others = others;
+        let Grid { plan, fields, exchange, .. } = &mut self.grid;
+        let widths = self.physics.widths(plan);
+        let widths = (&widths, self.physics.coordinates);
+        let on = (&*plan, &exchange.seam);
+        fields.iter_mut().enumerate().fold(Ok(()), |sorted, (field, of_field)| {
+            let group = self.physics.group(field);
+            sorted.and(of_field.sort(on, &mut self.phases, &self.chunks, widths, group.as_ref()))
+        })
     }
 
     /// Collective over neighbours. `m_j = Σ w m`, `p_j = Σ w (m (v + C (x_j - x)) + Δt f) - Δt Σ V₀ τ ∇w` on
@@ -47,7 +35,7 @@ impl<const D: usize> Solver<D> {
     pub(in crate::solver) fn particles_to_nodes(&mut self, lengths: Lengths) {
         self.scatter_volumes();
         self.scale_masses(|mass, scale| mass * scale);
-        self.for_each_field(|solver, _| solver.note_velocities());
+        (0..self.grid.fields.len()).for_each(|field| self.note_velocities(field));
         let before = self.push_particles(lengths);
         self.nodes_from_particles(lengths.kick);
         self.take_back_push(&before);
@@ -57,15 +45,16 @@ impl<const D: usize> Solver<D> {
     /// Collective over neighbours. Momentum with the impulse of stress over `dt`, and mass, on real nodes, in
     /// each velocity field.
     pub(in crate::solver) fn nodes_from_particles(&mut self, dt: f64) {
-        let before = self.grid.exchange.traffic().bytes;
-        self.for_each_field(|solver, _| solver.field_from_particles(dt));
-        self.grid.sum_bytes = self.grid.exchange.traffic().bytes - before;
+        let before = self.grid.exchange.arenas.traffic().bytes;
+        (0..self.grid.fields.len()).for_each(|field| self.field_from_particles(field, dt));
+        self.grid.sum_bytes = self.grid.exchange.arenas.traffic().bytes - before;
     }
 
-    /// As [`Solver::nodes_from_particles`] in the first field.
-    pub(super) fn field_from_particles(&mut self, dt: f64) {
+    /// As [`Solver::nodes_from_particles`] in one velocity field.
+    pub(super) fn field_from_particles(&mut self, field: usize, dt: f64) {
         let (chunks, times, scheme) = (&self.chunks, &self.leaf_data.times, self.physics.scheme());
-        self.grid.scatter_and_sum(&mut self.phases, chunks, |scratch, bin, arena| {
+        let Grid { plan, fields, exchange, .. } = &mut self.grid;
+        fields[field].scatter_and_sum((plan, exchange), &mut self.phases, chunks, |scratch, bin, arena| {
             times.time(bin.leaf, || scatter(scratch, bin, chunks, &scheme, dt, arena));
         });
     }
@@ -78,14 +67,14 @@ impl<const D: usize> Solver<D> {
             return Ok(());
         }
         self.sort_into_bins()?;
-        self.for_each_field(|solver, _| solver.moments_of_field(done));
+        (0..self.grid.fields.len()).for_each(|field| self.moments_of_field(field, done));
         Ok(())
     }
 
-    /// As [`Solver::moments_from_affine`] with APIC for the sorted particles of the first field.
-    fn moments_of_field(&mut self, done: &[usize]) {
+    /// As [`Solver::moments_from_affine`] with APIC for the sorted particles of a velocity field.
+    fn moments_of_field(&mut self, field: usize, done: &[usize]) {
         let scheme = self.physics.scheme();
-        let (plan, lists) = (&self.grid.plan, &self.grid.lists);
+        let (plan, lists) = (&self.grid.plan, &self.grid.fields[field].lists);
         let with_moments = &self.physics.with_moments;
         let chunks = self.chunks.par_iter_mut().enumerate().filter(|(leaf, _)| lists.has_members(*leaf));
         chunks.for_each(|(leaf, chunk)| {

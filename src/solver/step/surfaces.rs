@@ -6,6 +6,7 @@ use rayon::prelude::*;
 
 use crate::boundary::gap::elastic_share;
 use crate::geometry::Aabb;
+use crate::grid::arenas::Arenas;
 use crate::grid::mask::{arena_overlap, bits, offset, offset_count};
 use crate::grid::plan::{GridPlan, NO_BLOCK};
 use crate::kernel::domain;
@@ -15,7 +16,8 @@ use crate::particle::group::Group;
 use crate::particle::volume::{box_volume, volume_ratios};
 use crate::solver::sorting::box_widths::BinMissing;
 use crate::solver::state::Solver;
-use crate::solver::state::grid::{Solids, VelocityField};
+use crate::solver::state::grid::{Grid, Solids};
+use crate::solver::state::velocity_field::VelocityField;
 use crate::solver::step::p2g::scatter;
 
 /// Share of a length by which boxes that must hold something are larger.
@@ -104,26 +106,28 @@ impl<const D: usize> Solver<D> {
         if !is_asked.contains(&true) {
             return Ok(());
         }
-        let mut solids = std::mem::take(&mut self.grid.solids);
+        let Grid { plan, fields, exchange, walls, solids, .. } = &mut self.grid;
         if solids.is_empty() {
-            let fields = self.physics.body_contacts.fields();
-            solids.extend((0..fields).map(|_| Solids::new(&self.grid.plan, self.chunks.len())));
+            solids.extend(fields.iter().map(|_| Solids::new(plan, self.chunks.len())));
         }
+        let (widths, scheme) = (self.physics.widths(plan), self.physics.scheme());
+        let mut sum = |sums: &mut VelocityField<D>, copies: &[Chunk<D>]| {
+            let (phases, on) = (&mut self.phases, (&*plan, &exchange.seam));
+            let sorted = sums.sort(on, phases, copies, (&widths, scheme.coordinates), None);
+            sums.scatter_and_sum((plan, exchange), phases, copies, |scratch, bin, arena| {
+                scatter(scratch, bin, copies, &scheme, 1.0, arena);
+            });
+            sorted
+        };
         let mut sorted = Ok(());
-        self.for_each_field(|solver, field| {
-            if !is_asked[field] {
-                return;
-            }
-            let near = solver.near_nodes(scattering);
-            let group = solver.physics.group(field);
-            let (widths, scheme) = (solver.physics.widths(&solver.grid.plan), solver.physics.scheme());
-            let plan = &solver.grid.plan;
-            let yields =
-                solver.grid.walls.known_over.is_some() && solver.physics.moves_until_it_yields(field);
+        for (field, solids) in solids.iter_mut().enumerate().filter(|(field, _)| is_asked[*field]) {
+            let near = near_nodes(plan, &fields[field].arenas, scattering, self.chunks.len());
+            let group = self.physics.group(field);
+            let yields = walls.known_over.is_some() && self.physics.moves_until_it_yields(field);
             let yielded = yields.then_some(Layout::<D>::PLASTIC_STRAIN);
             let columns: Vec<usize> = domain::columns::<D>().chain(yielded).collect();
-            let Solids { copies, members, field: all, elastic } = &mut solids[field];
-            let leaves = copies.par_iter_mut().zip(members).zip(&solver.chunks).zip(near).enumerate();
+            let Solids { copies, members, field: all, elastic } = solids;
+            let leaves = copies.par_iter_mut().zip(members).zip(&self.chunks).zip(near).enumerate();
             leaves.with_min_len(16).for_each(|(leaf, (((copy, members), chunk), near))| {
                 if near.is_empty() {
                     (*copy, *members) = (Chunk::new(), Vec::new());
@@ -137,47 +141,39 @@ impl<const D: usize> Solver<D> {
                     keep_elastic(copy);
                 }
             });
-            let Self { grid, phases, .. } = solver;
-            *elastic = (yields && is_between)
-                .then(|| elastic.take().unwrap_or_else(|| VelocityField::new(&grid.plan)));
-            let mut sum = |sums: &mut VelocityField<D>, copies: &[Chunk<D>]| {
-                grid.swap(sums);
-                let of_field = grid.sort(phases, copies, (&widths, scheme.coordinates), None);
-                grid.scatter_and_sum(phases, copies, |scratch, bin, arena| {
-                    scatter(scratch, bin, copies, &scheme, 1.0, arena);
-                });
-                grid.swap(sums);
-                of_field
-            };
+            *elastic =
+                (yields && is_between).then(|| elastic.take().unwrap_or_else(|| VelocityField::new(plan)));
             sorted = sorted.and(sum(all, copies));
             if let Some(elastic) = elastic {
                 copies.par_iter_mut().with_min_len(16).for_each(keep_elastic);
                 sorted = sorted.and(sum(elastic, copies));
             }
-        });
-        self.grid.solids = solids;
+        }
         sorted
     }
+}
 
-    /// Per own leaf, a box of the points whose hats in the bins of the first velocity field reach any of
-    /// these nodes, which are given block by block; empty where there is none.
-    fn near_nodes(&self, nodes: &[u64]) -> Vec<Aabb<D>> {
-        let plan = &self.grid.plan;
-        let overlaps: Vec<u64> =
-            (0..offset_count(D)).map(|index| arena_overlap(offset::<D>(index))).collect();
-        let mut near = vec![Aabb::EMPTY; self.chunks.len()];
-        for bin in self.grid.arenas.bins().map(|bin| &plan.bins[bin]) {
-            let around = bin.around.iter().zip(&overlaps).filter(|(block, _)| **block != NO_BLOCK);
-            for (&block, overlap) in around {
-                let reached = nodes[block as usize] & overlap;
-                if reached != 0 {
-                    let box_of_nodes = box_of_nodes(plan, block as usize, reached);
-                    let reach = plan.cell(bin.block.level) * (1.0 + MARGIN);
-                    let all = &mut near[bin.leaf as usize];
-                    *all = all.hull(&box_of_nodes.grown(reach));
-                }
+/// Per own leaf, of which there are so many, a box of the points whose hats in the occupied bins reach any of
+/// these nodes, which are given block by block; empty where there is none.
+fn near_nodes<const D: usize>(
+    plan: &GridPlan<D>,
+    arenas: &Arenas<D>,
+    nodes: &[u64],
+    leaves: usize,
+) -> Vec<Aabb<D>> {
+    let overlaps: Vec<u64> = (0..offset_count(D)).map(|index| arena_overlap(offset::<D>(index))).collect();
+    let mut near = vec![Aabb::EMPTY; leaves];
+    for bin in arenas.bins().map(|bin| &plan.bins[bin]) {
+        let around = bin.around.iter().zip(&overlaps).filter(|(block, _)| **block != NO_BLOCK);
+        for (&block, overlap) in around {
+            let reached = nodes[block as usize] & overlap;
+            if reached != 0 {
+                let box_of_nodes = box_of_nodes(plan, block as usize, reached);
+                let reach = plan.cell(bin.block.level) * (1.0 + MARGIN);
+                let all = &mut near[bin.leaf as usize];
+                *all = all.hull(&box_of_nodes.grown(reach));
             }
         }
-        near
     }
+    near
 }

@@ -3,11 +3,10 @@
 use rayon::prelude::*;
 
 use crate::boundary::{Collider, ColliderState};
-use crate::grid::GridPlan;
 use crate::grid::leaf_geometry::{LeafCells, leaf_box};
 use crate::grid::mask::bits;
 use crate::grid::plan::Block;
-use crate::grid::ties::Ties;
+use crate::grid::{GridPlan, NodeFields};
 use crate::kernel::BLOCK;
 use crate::load::{Kind, Load};
 use crate::particle::Chunk;
@@ -78,33 +77,29 @@ fn near_colliders<const D: usize>(
 impl<const D: usize> Solver<D> {
     /// Nodes with mass of each velocity field, a word for each block, where fields with ties meet others. To
     /// be called before velocities of nodes change.
-    pub(super) fn occupied(&mut self) -> Vec<Vec<u64>> {
-        let mut occupied = Vec::new();
-        if self.grid.ties.is_some() && self.physics.body_contacts.fields() > 1 {
-            self.for_each_field(|solver, _| {
-                let Grid { fields, plan, .. } = &solver.grid;
-                let blocks = plan.blocks.par_iter().zip(&fields.active).enumerate().with_min_len(64);
-                let words = blocks.map(|(index, (block, active))| match active {
-                    true => fields.with_mass(index, block.real_nodes(), 0.0),
-                    false => 0,
-                });
-                occupied.push(words.collect());
+    pub(super) fn occupied(&self) -> Vec<Vec<u64>> {
+        let plan = &self.grid.plan;
+        let of_field = |nodes: &NodeFields<D>| {
+            let blocks = plan.blocks.par_iter().zip(&nodes.active).enumerate().with_min_len(64);
+            let words = blocks.map(|(index, (block, active))| match active {
+                true => nodes.with_mass(index, block.real_nodes(), 0.0),
+                false => 0,
             });
-        }
-        occupied
+            words.collect()
+        };
+        let meet = self.grid.ties.is_some() && self.physics.body_contacts.fields() > 1;
+        if meet { self.grid.all_fields().map(of_field).collect() } else { Vec::new() }
     }
 
-    /// Collective over neighbours. Ties the surface nodes of the velocity field numbered `field`, which is in
-    /// the place of the first and whose rows hold velocities, if it has ties. Free of ties stay nodes that
-    /// other conditions move and nodes beside what the material may touch, where ties would keep it from
-    /// giving way: nodes on faces of the domain, in grips, within a cell of colliders, and those of other
-    /// fields, whose nodes with mass are `occupied`.
+    /// Collective over neighbours. Ties the surface nodes of the velocity field numbered `field`, whose rows
+    /// hold velocities, if it has ties. Free of ties stay nodes that other conditions move and nodes beside what
+    /// the material may touch, where ties would keep it from giving way: nodes on faces of the domain, in grips,
+    /// within a cell of colliders, and those of other fields, whose nodes with mass are `occupied`.
     pub(super) fn tie_surface(&mut self, field: usize, occupied: &[Vec<u64>]) {
         if !self.physics.has_ties(field) {
             return;
         }
-        let Some(mut ties) = self.grid.ties.take() else { return };
-        self.fill_cells(&mut ties, field);
+        self.fill_cells(field);
         let all = self.physics.colliders.iter().zip(&self.contacts.states);
         let (still, moving): (Vec<_>, Vec<_>) =
             all.filter(|(collider, _)| collider.is_present()).partition(|(collider, _)| is_still(collider));
@@ -114,13 +109,13 @@ impl<const D: usize> Solver<D> {
             .iter()
             .filter(|load| matches!(load.kind, Kind::Velocity(_)) && load.is_active(self.clock.time))
             .collect();
-        let Grid { fields, plan, .. } = &mut self.grid;
-        let plan = &*plan;
+        let Grid { fields, plan, ties, .. } = &mut self.grid;
+        let (Some(ties), nodes, plan) = (ties, &mut fields[field].nodes, &*plan) else { return };
         self.phases.time(Phase::Nodes, || {
-            ties.note_still(fields, |block| {
+            ties.note_still(nodes, |block| {
                 near_colliders(plan, &plan.blocks[block], plan.blocks[block].real_nodes(), &still)
             });
-            ties.tie(plan, field, fields, |index, nodes| {
+            ties.tie(plan, field, nodes, |index, nodes| {
                 let block = &plan.blocks[index];
                 let others = occupied.iter().enumerate().filter(|(other, _)| *other != field);
                 let touched = others.fold(0, |all, (_, words)| all | words[index]);
@@ -132,13 +127,13 @@ impl<const D: usize> Solver<D> {
                 touched | gripped | near_colliders(plan, block, nodes, &moving)
             });
         });
-        self.grid.ties = Some(ties);
     }
 
-    /// Collective over neighbours. Tells the ties which cells the particles of a velocity field fill well.
-    pub(in crate::solver) fn fill_cells(&mut self, ties: &mut Ties<D>, field: usize) {
-        let group = self.physics.group(field);
-        let plan = &self.grid.plan;
+    /// Collective over neighbours. Tells the ties which cells the particles of a velocity field fill well, in
+    /// jobs that have ties.
+    pub(in crate::solver) fn fill_cells(&mut self, field: usize) {
+        let Grid { plan, ties: Some(ties), .. } = &mut self.grid else { return };
+        let (group, plan) = (self.physics.group(field), &*plan);
         let leaves = self.chunks.par_iter().zip(self.forest.leaves()).with_min_len(16);
         let own: Vec<u64> = self.phases.time(Phase::Nodes, || {
             let filled = leaves.map(|(chunk, leaf)| match chunk.is_empty() {

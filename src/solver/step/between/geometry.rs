@@ -5,7 +5,8 @@ use crate::grid::mask::{bits, block_nodes};
 use crate::grid::{NodeFields, Window};
 use crate::kernel::{ARENA_EDGE, BLOCK, Row};
 use crate::solver::state::Solver;
-use crate::solver::state::grid::{Grid, VelocityField};
+use crate::solver::state::grid::Grid;
+use crate::solver::state::velocity_field::VelocityField;
 
 impl<const D: usize> Grid<D> {
     /// Real nodes of each block at which two velocity fields have mass.
@@ -35,17 +36,16 @@ impl<const D: usize> Solver<D> {
         if !self.grid.hats.is_empty() {
             return;
         }
-        let mut of_cells = VelocityField::new(&self.grid.plan);
-        self.grid.swap(&mut of_cells);
-        let plan = &self.grid.plan;
+        let Grid { plan, exchange, hats, .. } = &mut self.grid;
+        let mut of_cells = VelocityField::new(plan);
         let own_bins = (0..self.chunks.len()).map(|leaf| (plan.leaf_bins(leaf).start, Window::FULL));
-        self.grid.arenas.occupy(plan, &self.grid.seam, own_bins);
+        of_cells.arenas.occupy(plan, &exchange.seam, own_bins);
         // Members of bins are not used.
         let cells: Vec<f64> = (0..plan.levels()).map(|level| plan.cell(level as u8)).collect();
         let places = plan.bins.iter().map(|bin| (usize::from(bin.block.level), bin.block.coord[0]));
         let places: Vec<(usize, u32)> = places.collect();
         let coordinates = self.physics.coordinates;
-        self.grid.scatter_and_sum(&mut self.phases, &self.chunks, |(), bin, mut arena| {
+        of_cells.scatter_and_sum((plan, exchange), &mut self.phases, &self.chunks, |(), bin, mut arena| {
             arena.clear(&Window::FULL);
             let (level, place) = places[bin.number];
             let cell = cells[level];
@@ -56,9 +56,7 @@ impl<const D: usize> Solver<D> {
                 arena.rows[node] = Row([0.0, 0.0, 0.0, share * f64::from(cells) * around])
             });
         });
-        let hats = self.grid.fields.rows.iter().map(|row| row.0[3]).collect();
-        self.grid.swap(&mut of_cells);
-        self.grid.hats = hats;
+        hats.extend(of_cells.nodes.rows.iter().map(|row| row.0[3]));
     }
 }
 

@@ -27,7 +27,7 @@ impl<const D: usize> Solver<D> {
     /// where there is none, and between two steps.
     pub(super) fn meeting_nodes(&mut self, is_step: bool) -> Vec<u64> {
         // What particles have between two steps needs no holding apart.
-        if self.grid.others.is_empty() || !is_step {
+        if self.grid.fields.len() == 1 || !is_step {
             return Vec::new();
         }
         self.fade_pressures();

@@ -18,8 +18,9 @@ use crate::grid::sums::node_fields::load_rows;
 use crate::grid::{GridPlan, Window};
 use crate::kernel::{ARENA_EDGE, BLOCK, Row, arena_nodes};
 use crate::solver::state::Solver;
-use crate::solver::state::grid::VelocityField;
+use crate::solver::state::grid::Grid;
 use crate::solver::state::phases::Phase;
+use crate::solver::state::velocity_field::VelocityField;
 use crate::solver::state::walls::with_children;
 
 /// Smoothed `Σ V ∇w` at the nodes where bodies meet.
@@ -59,24 +60,28 @@ impl<const D: usize> Solver<D> {
     /// Collective over neighbours. Smooths `Σ V ∇w` over the cells around the nodes where bodies meet, given
     /// block by block. The volumes of hats are known.
     pub(super) fn smooth_gradients(&mut self, meets: &[u64]) -> Smoothed<D> {
-        let mut other =
-            self.grid.contact.take().unwrap_or_else(|| Box::new(VelocityField::new(&self.grid.plan)));
-        self.grid.swap(&mut other);
-        let fields = self.physics.body_contacts.fields();
-        let passes = if fields == 2 { 1 } else { fields };
+        self.grid.contact.provide(&self.grid.plan);
+        let passes = if self.grid.fields.len() == 2 { 1 } else { self.grid.fields.len() };
         let of_field = (0..passes).map(|field| {
             let own = self.meets_of(field, meets);
             let mut leaves = self.leaves_at(&own);
+            let Grid { plan, exchange, contact, .. } = &mut self.grid;
             let bins = leaves.iter().map(|leaf| (leaf.bin, Window::FULL));
-            self.grid.arenas.occupy(&self.grid.plan, &self.grid.seam, bins);
+            contact.arenas.occupy(plan, &exchange.seam, bins);
             self.cell_means(&own, &mut leaves, (field, passes));
-            self.grid.scatter_and_sum(&mut self.phases, &self.chunks, |(), bin, mut arena| {
-                arena.clear(&Window::FULL);
-                if let Ok(leaf) = leaves.binary_search_by_key(&bin.number, |leaf| leaf.bin) {
-                    leaves[leaf].scatter(arena.rows);
-                }
-            });
-            let rows = &self.grid.fields.rows;
+            let Grid { plan, exchange, contact, .. } = &mut self.grid;
+            contact.scatter_and_sum(
+                (plan, exchange),
+                &mut self.phases,
+                &self.chunks,
+                |(), bin, mut arena| {
+                    arena.clear(&Window::FULL);
+                    if let Ok(leaf) = leaves.binary_search_by_key(&bin.number, |leaf| leaf.bin) {
+                        leaves[leaf].scatter(arena.rows);
+                    }
+                },
+            );
+            let rows = &contact.nodes.rows;
             let blocks = meets.iter().enumerate();
             let nodes = blocks.flat_map(|(block, nodes)| {
                 bits(*nodes).map(move |bit| block * block_nodes(D) + bit as usize)
@@ -84,8 +89,6 @@ impl<const D: usize> Solver<D> {
             nodes.map(|node| std::array::from_fn(|a| rows[node].0[a])).collect()
         });
         let of_field = of_field.collect();
-        self.grid.swap(&mut other);
-        self.grid.contact = Some(other);
         let first = meets.iter().scan(0, |next, nodes| {
             let first = *next;
             *next += nodes.count_ones() as usize;
@@ -96,7 +99,7 @@ impl<const D: usize> Solver<D> {
 
     /// Those of the nodes where bodies meet that a velocity field has mass at.
     fn meets_of(&self, field: usize, meets: &[u64]) -> Vec<u64> {
-        let fields = &self.grid.solids[field].field.fields;
+        let fields = &self.grid.solids[field].field.nodes;
         let own = |(block, nodes): (usize, &u64)| {
             let has_mass = |bit: &u32| fields.rows[block * block_nodes(D) + *bit as usize].0[3] > 0.0;
             let nodes = if fields.active[block] { *nodes } else { 0 };
@@ -131,15 +134,15 @@ impl<const D: usize> Solver<D> {
     /// Not collective. Means of `Σ V ∇w` over the volumes of hats at the corners of cells, as far as bodies
     /// touch there, of a velocity field out of so many that have a pass of their own.
     fn cell_means(&mut self, meets: &[u64], leaves: &mut [Leaf<D>], (field, passes): (usize, usize)) {
-        let grid = &mut self.grid;
-        let (plan, solids, hats) = (&grid.plan, &grid.solids, &grid.hats);
+        let Grid { plan, solids, hats, contact: VelocityField { nodes, arenas, .. }, .. } = &mut self.grid;
+        let (plan, solids) = (&*plan, &*solids);
         let gradient = |node: usize| -> Row {
             let (block, bit) = (node / block_nodes(D), node % block_nodes(D));
             if meets[block] >> bit & 1 == 0 {
                 return Row::default();
             }
             let on_faces = plan.faces_at(node);
-            let of = |field: usize| &solids[field].field.fields.rows[node].0;
+            let of = |field: usize| &solids[field].field.nodes.rows[node].0;
             let all: f64 = (0..solids.len()).map(|field| of(field)[3]).sum();
             let own = of(field)[3];
             let part = part_in_normals(gap_between([own, all - own].map(|volume| volume / hats[node])));
@@ -155,10 +158,9 @@ impl<const D: usize> Solver<D> {
                 part * sum / hats[node]
             }))
         };
-        let (fields, arenas) = (&mut grid.fields, &grid.arenas);
         self.phases.time(Phase::Nodes, || {
-            fields.spread(plan, arenas, gradient);
-            let rows = &fields.rows;
+            nodes.spread(plan, arenas, gradient);
+            let rows = &nodes.rows;
             let buffer = || vec![Row::default(); arena_nodes(D)];
             leaves
                 .par_iter_mut()

@@ -101,11 +101,7 @@ impl<const D: usize> Solver<D> {
         for Pressed { velocities, booked, forces } in pressed {
             all_forces.extend(forces);
             for (node, field, velocity) in velocities {
-                let fields = match field {
-                    0 => &mut self.grid.fields,
-                    field => &mut self.grid.others[field - 1].fields,
-                };
-                fields.rows[node].0[..D].copy_from_slice(&velocity);
+                self.grid.fields[field].nodes.rows[node].0[..D].copy_from_slice(&velocity);
             }
             for Booked { contact, impulse, work } in booked {
                 let sums = &mut self.sums.bodies.of[usize::from(contact)];
@@ -229,7 +225,7 @@ impl<const D: usize> Press<'_, D> {
             return Some(Exchange { impulse, pressed: [0.0; 2] });
         }
         let sums = bodies.map(|body| {
-            let row = self.solids[body.field].field.fields.rows[node].0;
+            let row = self.solids[body.field].field.nodes.rows[node].0;
             (std::array::from_fn(|a| row[a]), row[3])
         });
         let (block, bit) = (node / block_nodes(D), (node % block_nodes(D)) as u32);

@@ -2,10 +2,13 @@
 use rayon::prelude::*;
 
 use super::press::NormalForce;
-use crate::kernel::Row;
+use crate::grid::GridPlan;
+use crate::kernel::{Row, Scheme};
 use crate::solver::state::Solver;
-use crate::solver::state::grid::Solids;
-use crate::solver::state::phases::Phase;
+use crate::solver::state::grid::{Grid, Solids};
+use crate::solver::state::phases::{Phase, Phases};
+use crate::solver::state::velocity_field::VelocityField;
+use crate::solver::step::g2p::interpolate;
 
 /// Weight of the last step in the mean that particles carry.
 const LAST: f64 = 0.05;
@@ -23,10 +26,11 @@ impl<const D: usize> Solver<D> {
     /// normal forces F on areas A there.
     pub(super) fn carry_pressures(&mut self, forces: &[NormalForce]) {
         let Some(column) = self.physics.followed_columns().contact_pressure else { return };
-        let mut all = std::mem::take(&mut self.grid.solids);
-        for (field, solids) in all.iter_mut().enumerate() {
-            let at_nodes = self.at_particles(solids, forces.iter().filter(|at| at.field == field));
-            let carried = self.physics.carried_columns();
+        let (carried, scheme) = (self.physics.carried_columns(), self.physics.scheme());
+        let Grid { plan, solids, .. } = &mut self.grid;
+        for (field, solids) in solids.iter_mut().enumerate() {
+            let forces = forces.iter().filter(|at| at.field == field);
+            let at_nodes = at_particles(plan, solids, forces, &scheme, &mut self.phases);
             let leaves = self.chunks.par_iter_mut().zip(&solids.members).zip(at_nodes);
             self.phases.time(Phase::Gather, || {
                 leaves.filter(|((_, members), _)| !members.is_empty()).for_each(
@@ -42,28 +46,24 @@ impl<const D: usize> Solver<D> {
                 );
             });
         }
-        self.grid.solids = all;
     }
+}
 
-    /// `Σ w F` and `Σ w A` over these nodes at the copies of particles, leaf by leaf. The sums at the
-    /// nodes stay: faces and colliders read them next.
-    fn at_particles<'a>(
-        &mut self,
-        solids: &mut Solids<D>,
-        forces: impl Iterator<Item = &'a NormalForce>,
-    ) -> Vec<Vec<[f64; 2]>> {
-        self.grid.swap(&mut solids.field);
-        std::mem::swap(&mut self.chunks, &mut solids.copies);
-        let kept = self.grid.fields.rows.to_vec();
-        self.grid.fields.rows.fill(Row::default());
-        for at in forces {
-            self.grid.fields.rows[at.node] = Row([at.force, at.area, 0.0, 0.0]);
-        }
-        self.prolong();
-        let sums = self.interpolate();
-        self.grid.fields.rows.copy_from_slice(&kept);
-        std::mem::swap(&mut self.chunks, &mut solids.copies);
-        self.grid.swap(&mut solids.field);
-        sums.into_iter().map(|leaf| leaf.into_iter().map(|sums| [sums[0], sums[1]]).collect()).collect()
+/// `Σ w F` and `Σ w A` over these nodes at the copies of particles, leaf by leaf. The sums at the nodes stay:
+/// faces and colliders read them next.
+fn at_particles<'a, const D: usize>(
+    plan: &GridPlan<D>,
+    solids: &mut Solids<D>,
+    forces: impl Iterator<Item = &'a NormalForce>,
+    scheme: &Scheme<'_>,
+    phases: &mut Phases,
+) -> Vec<Vec<[f64; 2]>> {
+    let Solids { copies, field: VelocityField { nodes, arenas, lists, .. }, .. } = solids;
+    let mut rows = vec![Row::default(); nodes.rows.len()];
+    for at in forces {
+        rows[at.node] = Row([at.force, at.area, 0.0, 0.0]);
     }
+    phases.time(Phase::Nodes, || nodes.prolong_rows(plan, arenas, &mut rows));
+    let sums = phases.time(Phase::Gather, || interpolate(plan, (lists, &rows), copies, scheme));
+    sums.into_iter().map(|leaf| leaf.into_iter().map(|sums| [sums[0], sums[1]]).collect()).collect()
 }

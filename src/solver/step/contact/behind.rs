@@ -34,11 +34,11 @@ pub(super) struct Behind<const D: usize> {
 }
 
 impl<const D: usize> Solver<D> {
-    /// Not collective. The real nodes of the first velocity field that have mass and are behind the surface
-    /// of a collider that acts on particles, in the order of blocks, colliders and nodes.
-    pub(super) fn nodes_behind(&mut self) -> Vec<Behind<D>> {
+    /// Not collective. The real nodes of a velocity field that have mass and are behind the surface of a
+    /// collider that acts on particles, in the order of blocks, colliders and nodes.
+    pub(super) fn nodes_behind(&mut self, field: usize) -> Vec<Behind<D>> {
         let (physics, states) = (&self.physics, &self.contacts.states);
-        let (plan, fields) = (&self.grid.plan, &self.grid.fields);
+        let (plan, fields) = (&self.grid.plan, &self.grid.fields[field].nodes);
         let acting = || {
             let all = physics.colliders.iter().zip(states).enumerate();
             all.filter(|(_, (collider, _))| collider.acts_on_particles())
@@ -74,17 +74,18 @@ impl<const D: usize> Solver<D> {
         })
     }
 
-    /// Not collective. Has nodes behind surfaces, of the velocity field in the place of the first, obey the
-    /// laws of their colliders. Adds their impulses.
+    /// Not collective. Has nodes of a velocity field behind surfaces obey the laws of their colliders. Adds
+    /// their impulses.
     pub(super) fn hold_behind(
         &mut self,
+        field: usize,
         behind: &[Behind<D>],
         rates: &[Rate<D>],
         sums: &mut [[ExactSum; SUMS]],
     ) {
         let (colliders, states) = (&self.physics.colliders, &self.contacts.states);
         for &Behind { collider, node, is_counted, at, normal } in behind {
-            let row = &mut self.grid.fields.rows[node];
+            let row = &mut self.grid.fields[field].nodes.rows[node];
             let of = (&colliders[collider], &states[collider], &rates[collider]);
             if let Some(impulse) = obey(row, &at, of, &normal, Bounds::TOUCHING).filter(|_| is_counted) {
                 Touch { collider, position: at, impulse }.book(colliders, states, sums);

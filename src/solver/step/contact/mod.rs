@@ -35,7 +35,7 @@ use crate::particle::Chunk;
 use crate::solver::sorting::box_widths::BinMissing;
 use crate::solver::state::Solver;
 use crate::solver::state::bookings::SUMS;
-use crate::solver::state::grid::VelocityField;
+use crate::solver::state::grid::Grid;
 use crate::solver::state::phases::Phase;
 use crate::solver::step::colliders::Touch;
 
@@ -75,31 +75,25 @@ impl<const D: usize> Solver<D> {
         if !self.phases.time(Phase::Reduce, || self.comm.any(is_any)) {
             return Ok(());
         }
-        let behind = self.nodes_behind();
-        let mut other =
-            self.grid.contact.take().unwrap_or_else(|| Box::new(VelocityField::new(&self.grid.plan)));
-        let widths = self.physics.widths(&self.grid.plan);
-        self.grid.swap(&mut other);
-        let coordinates = self.physics.coordinates;
-        let sorted = self.grid.sort(&mut self.phases, &chunks, (&widths, coordinates), None);
+        let behind = self.nodes_behind(field);
+        let Grid { plan, exchange, contact, .. } = &mut self.grid;
+        contact.provide(plan);
+        let widths = (&self.physics.widths(plan), self.physics.coordinates);
+        let sorted = contact.sort((plan, &exchange.seam), &mut self.phases, &chunks, widths, None);
         let spreads = self.spreads_in_contact(&chunks);
-        self.find_compliances(&mut other, &mut chunks, &spreads, &mut touching);
+        self.find_compliances(field, &mut chunks, &spreads, &mut touching);
         for _ in 0..SWEEPS {
-            self.take_velocities(&other);
+            self.take_velocities(field);
             let velocities = self.velocities_in_contact(&chunks, &spreads, &touching);
             let impulses: Vec<Vec<[f64; D]>> =
                 touching.par_iter_mut().zip(&velocities).map(correct).collect();
             self.scatter_impulses(&mut chunks, &spreads, &touching, |leaf, p| impulses[leaf][p]);
-            self.add_impulses(&mut other);
-            self.grid.swap(&mut other);
+            self.add_impulses(field);
             self.hold_at_nodes(field, rates, sums);
-            self.hold_behind(&behind, rates, sums);
+            self.hold_behind(field, &behind, rates, sums);
             // Faces that absorb waves have had their share of the step.
             self.apply_faces(field, Lengths::NONE, true);
-            self.grid.swap(&mut other);
         }
-        self.grid.swap(&mut other);
-        self.grid.contact = Some(other);
         let (colliders, states) = (&self.physics.colliders, &self.contacts.states);
         for (chunk, touching) in chunks.iter().zip(&touching) {
             for (p, contact) in touching.iter().enumerate() {

@@ -12,8 +12,9 @@ use crate::particle::Chunk;
 use crate::particle::chunk::Layout;
 use crate::solver::sorting::bin_view::BinView;
 use crate::solver::state::Solver;
-use crate::solver::state::grid::VelocityField;
+use crate::solver::state::grid::Grid;
 use crate::solver::state::phases::Phase;
+use crate::solver::state::velocity_field::VelocityField;
 use crate::solver::step::look::Look;
 use crate::solver::step::p2g::{scatter, spreads};
 
@@ -36,7 +37,7 @@ impl<const D: usize> Default for Scratch<D> {
 impl<const D: usize> Solver<D> {
     /// Not collective. Second moments of the weights of the particles in contact, which are sorted.
     pub(super) fn spreads_in_contact(&self, chunks: &[Chunk<D>]) -> Spreads<D> {
-        let (plan, lists, scheme) = (&self.grid.plan, &self.grid.lists, self.physics.scheme());
+        let (plan, lists, scheme) = (&self.grid.plan, &self.grid.contact.lists, self.physics.scheme());
         let leaves = chunks.par_iter().enumerate().with_min_len(16);
         let spreads = leaves.map(|(leaf, chunk)| {
             spreads(BinView::of_leaf(plan, lists.of_leaf(leaf), leaf, chunk.len()), chunk, &scheme)
@@ -45,18 +46,19 @@ impl<const D: usize> Solver<D> {
     }
 
     /// Collective over neighbours. Velocity at each point of contact by an impulse of 1 kg m/s on all
-    /// particles in contact. `other` has the masses of the nodes.
+    /// particles in contact of a velocity field.
     pub(super) fn find_compliances(
         &mut self,
-        other: &mut VelocityField<D>,
+        field: usize,
         chunks: &mut [Chunk<D>],
         spreads: &Spreads<D>,
         touching: &mut [Vec<Touching<D>>],
     ) {
         let unit = std::array::from_fn(|a| if a == 0 { 1.0 } else { 0.0 });
         self.scatter_impulses(chunks, spreads, touching, |_, _| unit);
-        let masses = &other.fields.rows;
-        for_real_nodes(&mut self.grid.fields, &self.grid.plan, |node, row| {
+        let Grid { plan, fields, contact, .. } = &mut self.grid;
+        let masses = &fields[field].nodes.rows;
+        for_real_nodes(&mut contact.nodes, plan, |node, row| {
             let mass = masses[node].0[3];
             *row = Row([if mass > 0.0 { row.0[0] / mass } else { 0.0 }, 0.0, 0.0, 0.0]);
         });
@@ -97,17 +99,18 @@ impl<const D: usize> Solver<D> {
         }
         let chunks: &[Chunk<D>] = chunks;
         let times = &self.leaf_data.times;
-        self.grid.scatter_and_sum(&mut self.phases, chunks, |scratch, bin, arena| {
+        let Grid { plan, exchange, contact, .. } = &mut self.grid;
+        contact.scatter_and_sum((plan, exchange), &mut self.phases, chunks, |scratch, bin, arena| {
             times.time(bin.leaf, || scatter(scratch, bin, chunks, &scheme, 0.0, arena));
         });
     }
 
-    /// Not collective. Adds the impulses on real nodes to the velocities of all particles' grid.
-    pub(in crate::solver::step) fn add_impulses(&mut self, other: &mut VelocityField<D>) {
-        let (fields, plan) = (&mut self.grid.fields, &self.grid.plan);
-        let rows = &mut other.fields.rows;
+    /// Not collective. Adds the impulses on real nodes to the velocities of a velocity field.
+    pub(in crate::solver::step) fn add_impulses(&mut self, field: usize) {
+        let Grid { plan, fields, contact, .. } = &mut self.grid;
+        let rows = &mut fields[field].nodes.rows;
         self.phases.time(Phase::Nodes, || {
-            for_real_nodes(fields, plan, |node, impulse| {
+            for_real_nodes(&mut contact.nodes, plan, |node, impulse| {
                 let row = &mut rows[node].0;
                 if row[3] > 0.0 {
                     (0..D).for_each(|a| row[a] += impulse.0[a] / row[3]);
@@ -116,11 +119,11 @@ impl<const D: usize> Solver<D> {
         });
     }
 
-    /// Not collective. Has the real nodes around particles in contact take the velocities of all particles'
-    /// grid.
-    pub(in crate::solver::step) fn take_velocities(&mut self, other: &VelocityField<D>) {
-        let rows = &other.fields.rows;
-        for_real_nodes(&mut self.grid.fields, &self.grid.plan, |node, row| {
+    /// Not collective. Has the real nodes around what is in contact take the velocities of a velocity field.
+    pub(in crate::solver::step) fn take_velocities(&mut self, field: usize) {
+        let Grid { plan, fields, contact, .. } = &mut self.grid;
+        let rows = &fields[field].nodes.rows;
+        for_real_nodes(&mut contact.nodes, plan, |node, row| {
             let [x, y, z, _] = rows[node].0;
             *row = Row([x, y, z, 0.0]);
         });
@@ -133,11 +136,10 @@ impl<const D: usize> Solver<D> {
         spreads: &Spreads<D>,
         touching: &[Vec<Touching<D>>],
     ) -> Vec<Vec<[f64; D]>> {
-        self.prolong();
-        let scheme = self.physics.scheme();
-        let (plan, lists, fields, arenas) =
-            (&self.grid.plan, &self.grid.lists, &self.grid.fields, &self.grid.arenas);
-        let look = Look { plan, fields, arenas, scheme: &scheme };
+        let Grid { plan, contact, .. } = &mut self.grid;
+        contact.prolong(plan, &mut self.phases);
+        let (scheme, VelocityField { nodes, arenas, lists, .. }) = (self.physics.scheme(), &*contact);
+        let look = Look { plan, fields: nodes, arenas, scheme: &scheme };
         let times = &self.leaf_data.times;
         self.phases.time(Phase::Gather, || {
             let leaves = chunks.par_iter().enumerate().with_min_len(8);

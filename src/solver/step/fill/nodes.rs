@@ -3,11 +3,14 @@ use rayon::prelude::*;
 
 use super::solid::add_solids;
 use crate::boundary::Collider;
+use crate::grid::GridPlan;
 use crate::grid::mask::{bits, block_nodes};
 use crate::grid::sums::volumes::OfBlock;
+use crate::kernel::Coordinates;
 use crate::particle::chunk::{Chunk, Layout, Tag};
 use crate::particle::volume::{reference_volume, volume};
 use crate::solver::state::Solver;
+use crate::solver::state::grid::Grid;
 use crate::solver::state::node_fill::NodeFill;
 use crate::solver::state::phases::Phase;
 
@@ -33,22 +36,19 @@ impl<const D: usize> Solver<D> {
         };
         let masses: Vec<Vec<f64>> = self.chunks.par_iter_mut().with_min_len(8).map(volumes).collect();
         let mut scattered = Vec::new();
-        self.for_each_field(|solver, field| {
-            if solver.physics.fill_densities[field].is_some() {
-                return scattered.push(Vec::new());
+        for field in 0..self.grid.fields.len() {
+            let mut sums = Vec::new();
+            if self.physics.fill_densities[field].is_none() {
+                self.field_from_particles(field, 0.0);
+                sums.extend(self.grid.fields[field].nodes.rows.iter().map(|row| row.0[3]));
             }
-            solver.field_from_particles(0.0);
-            scattered.push(solver.grid.fields.rows.iter().map(|row| row.0[3]).collect());
-        });
+            scattered.push(sums);
+        }
         for (chunk, masses) in self.chunks.iter_mut().zip(masses) {
             chunk.column_mut(Layout::<D>::MASS).into_iter().zip(masses).for_each(|(own, mass)| *own = mass);
         }
-        self.node_fill().scattered = scattered;
-    }
-
-    fn node_fill(&mut self) -> &mut NodeFill {
-        let (grid, coordinates) = (&mut self.grid, self.physics.coordinates);
-        grid.fill.get_or_insert_with(|| Box::new(NodeFill::new(&grid.plan, coordinates)))
+        let Grid { plan, fill, .. } = &mut self.grid;
+        node_fill(fill, plan, self.physics.coordinates).scattered = scattered;
     }
 
     /// Not collective. Finds how full the nodes are that G2P reads, in jobs with fluids: real ones from their
@@ -57,15 +57,13 @@ impl<const D: usize> Solver<D> {
         if !self.physics.keeps_volumes() {
             return;
         }
-        self.node_fill();
-        let grid = &mut self.grid;
-        let Some(mut fill) = grid.fill.take() else { return };
-        let (plan, nodes) = (&grid.plan, block_nodes(D));
-        let fields: Vec<_> = grid.all_fields().collect();
+        let Grid { plan, fields, fill, .. } = &mut self.grid;
+        let (fill, nodes) = (node_fill(fill, plan, self.physics.coordinates), block_nodes(D));
+        let fields: Vec<_> = fields.iter().map(|field| &field.nodes).collect();
         let densities = &self.physics.fill_densities;
         let (colliders, states) = (&self.physics.colliders, &self.contacts.states);
         let has_colliders = colliders.iter().any(Collider::is_present);
-        let NodeFill { of_nodes, volumes, dirty, scattered, open } = &mut *fill;
+        let NodeFill { of_nodes, volumes, dirty, scattered, open } = fill;
         self.phases.time(Phase::Nodes, || {
             let blocks = of_nodes.par_chunks_mut(nodes).zip(dirty).zip(open).enumerate().with_min_len(32);
             blocks.for_each(|(index, ((values, dirty), open))| {
@@ -103,6 +101,14 @@ impl<const D: usize> Solver<D> {
             });
             fields.iter().for_each(|fields| fields.prolong_values(plan, of_nodes));
         });
-        self.grid.fill = Some(fill);
     }
+}
+
+/// How full the nodes of a plan are, made if it is not yet there.
+fn node_fill<'a, const D: usize>(
+    fill: &'a mut Option<Box<NodeFill>>,
+    plan: &GridPlan<D>,
+    coordinates: Coordinates,
+) -> &'a mut NodeFill {
+    fill.get_or_insert_with(|| Box::new(NodeFill::new(plan, coordinates)))
 }

@@ -71,8 +71,8 @@ fn open<const D: usize>(
 
 impl<const D: usize> Solver<D> {
     /// Not collective. Applies the conditions of colliders, in their order, to the real nodes that they hold
-    /// themselves, of the velocity field numbered `field`, which is in the place of the first. Adds impulse
-    /// and angular impulse on each from the nodes that this rank counts.
+    /// themselves, of the velocity field numbered `field`. Adds impulse and angular impulse on each from the
+    /// nodes that this rank counts.
     pub(in crate::solver::step) fn hold_at_nodes(
         &mut self,
         field: usize,
@@ -143,9 +143,10 @@ fn hold<const D: usize>(
     at_feet: impl Fn(&Collider<D>) -> bool + Sync,
 ) -> Vec<Touch<D>> {
     let Grid { fields, inside_still, inside_moving, plan, solids, .. } = grid;
+    let nodes = &mut fields[of.field].nodes;
     let gaps = of.moves.then(|| solids[of.field].at_walls());
     let all = [&*inside_still, &*inside_moving];
-    let blocks = fields.rows.par_chunks_mut(block_nodes(D)).zip(&plan.blocks).zip(&fields.active);
+    let blocks = nodes.rows.par_chunks_mut(block_nodes(D)).zip(&plan.blocks).zip(&nodes.active);
     let active = blocks.enumerate().with_min_len(32).filter(|(_, (_, active))| **active);
     let touched = active.map(|(index, ((rows, block), _))| {
         let mut touches = Vec::new();

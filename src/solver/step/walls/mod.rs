@@ -41,7 +41,7 @@ use crate::leapfrog::Lengths;
 use crate::solver::sorting::box_widths::BinMissing;
 use crate::solver::state::Solver;
 use crate::solver::state::bookings::SUMS;
-use crate::solver::state::grid::VelocityField;
+use crate::solver::state::grid::Grid;
 use crate::solver::state::inside::{Asked, Inside, is_still};
 use crate::solver::state::phases::Phase;
 use crate::solver::state::walls::{StillWalls, with_children};
@@ -78,7 +78,7 @@ impl<const D: usize> Solver<D> {
             return Ok(());
         }
         let is_between = !meets.is_empty() && self.has_surfaces_between();
-        let is_any = (0..=self.grid.others.len()).any(|field| self.asks_for_gaps(field));
+        let is_any = (0..self.grid.fields.len()).any(|field| self.asks_for_gaps(field));
         let acts = self.physics.colliders.iter().any(Collider::acts_on_nodes);
         let is_near = self.grid.walls.is_near && (is_any || acts);
         if !is_between && !is_near {
@@ -89,7 +89,7 @@ impl<const D: usize> Solver<D> {
             false => vec![0; self.grid.plan.blocks.len()],
         };
         self.grid.walls.known_over = is_near.then_some(lengths);
-        let is_asked: Vec<bool> = (0..=self.grid.others.len())
+        let is_asked: Vec<bool> = (0..self.grid.fields.len())
             .map(|field| is_between || (is_near && self.asks_for_gaps(field)))
             .collect();
         if is_between {
@@ -119,8 +119,7 @@ impl<const D: usize> Solver<D> {
             return known;
         }
         let mut nodes = vec![0; plan.blocks.len()];
-        let (fields, others) = (&grid.fields, &grid.others);
-        let all: Vec<_> = std::iter::once(fields).chain(others.iter().map(|other| &other.fields)).collect();
+        let all: Vec<_> = grid.all_fields().collect();
         let beside: Vec<_> = colliders.iter().zip(&poses).filter(|(collider, _)| moves(collider)).collect();
         let blocks = nodes.par_iter_mut().zip(&plan.blocks).enumerate().with_min_len(32);
         let moving = blocks.map(|(index, (nodes, block))| {
@@ -157,37 +156,31 @@ impl<const D: usize> Solver<D> {
         self.has_moving_walls() || leaves.any(|(chunk, near)| *near && !chunk.is_empty())
     }
 
-    /// Collective over neighbours. Holds the material of the velocity field numbered `field`, which is in the
-    /// place of the first, to the conditions of colliders at feet, with those of nodes and faces. Adds
-    /// impulse and angular impulse on each collider.
+    /// Collective over neighbours. Holds the material of the velocity field numbered `field` to the conditions of
+    /// colliders at feet, with those of nodes and faces. Adds impulse and angular impulse on each collider.
     pub(super) fn hold_at_feet(&mut self, field: usize, rates: &[Rate<D>], sums: &mut [[ExactSum; SUMS]]) {
         let Some(lengths) = self.grid.walls.known_over.filter(|_| self.has_feet(field)) else { return };
         let physics = &self.physics;
         let acts = |number: usize| physics.acts_at_feet(field, &physics.colliders[number]);
-        let mut all = self
-            .phases
-            .time(Phase::Nodes, || self.grid.feet(&physics.colliders, &self.contacts.states, acts));
-        let mut other =
-            self.grid.contact.take().unwrap_or_else(|| Box::new(VelocityField::new(&self.grid.plan)));
-        self.grid.swap(&mut other);
+        let states = &self.contacts.states;
+        let mut all =
+            self.phases.time(Phase::Nodes, || self.grid.feet(field, &physics.colliders, states, acts));
+        let Grid { plan, exchange, contact, .. } = &mut self.grid;
+        contact.provide(plan);
         let bins = all.iter().map(|leaf| (leaf.bin, Window::FULL));
-        self.grid.arenas.occupy(&self.grid.plan, &self.grid.seam, bins);
-        let covered = self.find_gaps(field, lengths, rates, &mut all, &other);
-        self.find_compliances_at_feet(field, &mut all, &covered, &other);
+        contact.arenas.occupy(plan, &exchange.seam, bins);
+        let covered = self.find_gaps(field, lengths, rates, &mut all);
+        self.find_compliances_at_feet(field, &mut all, &covered);
         for _ in 0..SWEEPS {
-            self.take_velocities(&other);
-            self.prolong();
+            self.take_velocities(field);
+            self.grid.contact.prolong(&self.grid.plan, &mut self.phases);
             let impulses = self.correct_at_feet(&mut all, &covered);
             self.scatter_at_feet(&all, |leaf, foot| impulses[leaf][foot]);
-            self.add_impulses(&mut other);
-            self.grid.swap(&mut other);
+            self.add_impulses(field);
             self.hold_at_nodes(field, rates, sums);
             self.apply_faces(field, Lengths::NONE, true);
-            self.grid.swap(&mut other);
         }
-        self.take_along(field, &all, &covered, &mut other, rates, sums);
-        self.grid.swap(&mut other);
-        self.grid.contact = Some(other);
+        self.take_along(field, &all, &covered, rates, sums);
         let (colliders, states) = (&self.physics.colliders, &self.contacts.states);
         for leaf in &all {
             for (foot, contact) in leaf.feet.iter().zip(&leaf.touching) {

@@ -13,8 +13,9 @@ use crate::kernel::Row;
 use crate::leapfrog::Lengths;
 use crate::solver::state::Solver;
 use crate::solver::state::bookings::SUMS;
-use crate::solver::state::grid::{Grid, VelocityField};
+use crate::solver::state::grid::Grid;
 use crate::solver::state::inside::{Inside, Plane};
+use crate::solver::state::velocity_field::VelocityField;
 use crate::solver::step::colliders::Touch;
 use crate::solver::step::contact::sweeps::for_real_nodes;
 
@@ -25,25 +26,27 @@ const HEAVY: f64 = 64.0;
 pub(super) type Covered = Vec<Vec<f64>>;
 
 impl<const D: usize> Grid<D> {
-    /// Feet of nodes that have mass in the first velocity field, by own leaf that has any, on the colliders
-    /// whose number `acts` at feet.
+    /// Feet of nodes that have mass in a velocity field, by own leaf that has any, on the colliders whose
+    /// number `acts` at feet.
     pub(super) fn feet(
         &self,
+        field: usize,
         colliders: &[Collider<D>],
         states: &[ColliderState<D>],
         acts: impl Fn(usize) -> bool + Sync,
     ) -> Vec<LeafFeet<D>> {
         let Self { plan, fields, inside_still, inside_moving, .. } = self;
+        let nodes = &fields[field].nodes;
         let all = [inside_still, inside_moving];
         let blocks = (0..plan.blocks.len()).into_par_iter().with_min_len(256);
         let has_feet = |block: usize| {
             let mut inside = all.iter().filter_map(|inside| inside.get(block)).flatten().flatten();
-            fields.active[block] && inside.any(|inside| !inside.planes.is_empty() || inside.buried != 0)
+            nodes.active[block] && inside.any(|inside| !inside.planes.is_empty() || inside.buried != 0)
         };
         let has_feet: Vec<bool> = blocks.map(has_feet).collect();
         let has_mass = |row: usize| {
             let (block, bit) = (row / block_nodes(D), row % block_nodes(D));
-            plan.blocks[block].constrained >> bit & 1 == 1 || fields.rows[row].0[3] > 0.0
+            plan.blocks[block].constrained >> bit & 1 == 1 || nodes.rows[row].0[3] > 0.0
         };
         let acts_at_node = |collider: usize, plane: &Plane<D>, cell: f64| {
             is_at_another(colliders, states, collider, plane, cell)
@@ -78,46 +81,45 @@ fn of_block<'a, const D: usize>(
 }
 
 impl<const D: usize> Solver<D> {
-    /// Collective over neighbours. Finds the contact at each foot from the gap there, and how much of the
-    /// foot's cell has mass. `other` has the masses of the nodes.
+    /// Collective over neighbours. Finds the contact at each foot of a velocity field from the gap there, and
+    /// how much of the foot's cell has mass.
     pub(super) fn find_gaps(
         &mut self,
         field: usize,
         lengths: Lengths,
         rates: &[Rate<D>],
         all: &mut [LeafFeet<D>],
-        other: &VelocityField<D>,
     ) -> Covered {
         // This marks the nodes in reach of feet of any rank.
         self.scatter_at_feet(all, |_, _| [0.0; 4]);
-        let Grid { plan, solids, fields, arenas, .. } = &mut self.grid;
+        let Grid { plan, solids, fields, contact: VelocityField { nodes, arenas, .. }, .. } = &mut self.grid;
         let touches = !self.physics.moves_over_gaps(field);
         let known = !touches || self.physics.has_walls_by_area();
-        let masses = &other.fields.rows;
+        let masses = &fields[field].nodes.rows;
         let sums = |node: usize| match known {
             true => solids[field].at_walls()[node].0,
             false => [0.0; 4],
         };
         let cells: Vec<f64> = plan.blocks.iter().map(|block| plan.cell(block.level)).collect();
-        for_real_nodes(fields, plan, |node, row| {
+        for_real_nodes(nodes, plan, |node, row| {
             let has_mass = masses[node].0[3] > 0.0;
             let size = sums(node)[3] / cells[node / block_nodes(D)];
             *row = if has_mass { Row([size, 1.0, 0.0, 0.0]) } else { Row::default() };
         });
-        fields.prolong(plan, arenas);
+        nodes.prolong(plan, arenas);
         let sizes: Vec<Vec<_>> = all
             .iter()
-            .map(|leaf| leaf.feet.iter().map(|foot| foot.at_corners(&fields.rows)).collect())
+            .map(|leaf| leaf.feet.iter().map(|foot| foot.at_corners(&nodes.rows)).collect())
             .collect();
         let covered: Covered = all
             .iter()
-            .map(|leaf| leaf.feet.iter().map(|foot| foot.gather(&fields.rows)[1]).collect())
+            .map(|leaf| leaf.feet.iter().map(|foot| foot.gather(&nodes.rows)[1]).collect())
             .collect();
-        for_real_nodes(fields, plan, |node, row| {
+        for_real_nodes(nodes, plan, |node, row| {
             let [x, y, z, _] = sums(node);
             *row = if masses[node].0[3] > 0.0 { Row([x, y, z, 0.0]) } else { Row::default() };
         });
-        fields.prolong(plan, arenas);
+        nodes.prolong(plan, arenas);
         let (colliders, states) = (&self.physics.colliders, &self.contacts.states);
         for (leaf, (sizes, covered)) in all.iter_mut().zip(sizes.iter().zip(&covered)) {
             let each = leaf.feet.iter().zip(&mut leaf.touching).zip(sizes.iter().zip(covered));
@@ -128,7 +130,7 @@ impl<const D: usize> Solver<D> {
                 let collider = &colliders[foot.collider];
                 let gap = match touches || !collider.contact.has_gap() {
                     true => Some(0.0),
-                    false => foot.gap(self.physics.coordinates, sizes, &foot.at_corners(&fields.rows)),
+                    false => foot.gap(self.physics.coordinates, sizes, &foot.at_corners(&nodes.rows)),
                 };
                 *touching = gap.map(|gap| {
                     let surface =
@@ -148,7 +150,6 @@ impl<const D: usize> Solver<D> {
         field: usize,
         all: &mut [LeafFeet<D>],
         covered: &Covered,
-        other: &VelocityField<D>,
     ) {
         self.scatter_at_feet(all, |leaf, foot| {
             let Some(contact) = &all[leaf].touching[foot] else { return [0.0; 4] };
@@ -160,13 +161,14 @@ impl<const D: usize> Solver<D> {
                 );
             impulse.map(|impulse: f64| impulse / covered[leaf][foot])
         });
-        let masses = &other.fields.rows;
-        for_real_nodes(&mut self.grid.fields, &self.grid.plan, |node, row| {
+        let Grid { plan, fields, contact, .. } = &mut self.grid;
+        let masses = &fields[field].nodes.rows;
+        for_real_nodes(&mut contact.nodes, plan, |node, row| {
             let mass = masses[node].0[3];
             *row = Row(if mass > 0.0 { row.0.map(|sum| sum / mass) } else { [0.0; 4] });
         });
-        self.prolong();
-        let rows = &self.grid.fields.rows;
+        contact.prolong(plan, &mut self.phases);
+        let rows = &contact.nodes.rows;
         for (leaf, covered) in all.iter_mut().zip(covered) {
             for ((foot, touching), covered) in leaf.feet.iter().zip(&mut leaf.touching).zip(covered) {
                 if let Some(contact) = touching {
@@ -177,23 +179,17 @@ impl<const D: usize> Solver<D> {
             }
         }
         if self.physics.has_walls_by_area() {
-            self.find_areas(field, all, covered, other);
+            self.find_areas(field, all, covered);
         }
     }
 
     /// Not collective. Multiplies what cohesion bears by the area of the material's surface that each foot
     /// holds, and drag by the density there as well: a node shares `-Σ V ∇w · n` out to the feet that it is a
     /// corner of, by weights. Real nodes have the sums of these over their mass.
-    fn find_areas(
-        &mut self,
-        field: usize,
-        all: &mut [LeafFeet<D>],
-        covered: &Covered,
-        other: &VelocityField<D>,
-    ) {
-        let Grid { plan, solids, fields, arenas, .. } = &mut self.grid;
-        let (masses, sums) = (&other.fields.rows, solids[field].at_walls());
-        for_real_nodes(fields, plan, |node, row| {
+    fn find_areas(&mut self, field: usize, all: &mut [LeafFeet<D>], covered: &Covered) {
+        let Grid { plan, solids, fields, contact: VelocityField { nodes, arenas, .. }, .. } = &mut self.grid;
+        let (masses, sums) = (&fields[field].nodes.rows, solids[field].at_walls());
+        for_real_nodes(nodes, plan, |node, row| {
             let shares = masses[node].0[3] * row.0[3];
             let [x, y, z, volume] = sums[node].0;
             let density = if volume > 0.0 { masses[node].0[3] / volume } else { 0.0 };
@@ -202,11 +198,11 @@ impl<const D: usize> Solver<D> {
                 false => [0.0; 4],
             });
         });
-        fields.prolong(plan, arenas);
+        nodes.prolong(plan, arenas);
         for (leaf, covered) in all.iter_mut().zip(covered) {
             for ((foot, touching), covered) in leaf.feet.iter().zip(&mut leaf.touching).zip(covered) {
                 if let Some(contact) = touching {
-                    let slopes = foot.gather(&fields.rows);
+                    let slopes = foot.gather(&nodes.rows);
                     let area = gap::slope(&slopes, &foot.normal) / covered;
                     contact.sticking *= area.max(0.0);
                     contact.drag *= area.max(0.0) * slopes[3] / covered;
@@ -222,7 +218,7 @@ impl<const D: usize> Solver<D> {
         all: &mut [LeafFeet<D>],
         covered: &Covered,
     ) -> Vec<Vec<[f64; 4]>> {
-        let rows = &self.grid.fields.rows;
+        let rows = &self.grid.contact.nodes.rows;
         let leaves = all.iter_mut().zip(covered);
         let corrected = leaves.map(|(leaf, covered)| {
             let each = leaf.feet.iter().zip(&mut leaf.touching).zip(covered);
@@ -244,7 +240,8 @@ impl<const D: usize> Solver<D> {
         all: &[LeafFeet<D>],
         value: impl Fn(usize, usize) -> [f64; 4] + Sync + Send,
     ) {
-        self.grid.scatter_and_sum(&mut self.phases, &self.chunks, |(), bin, mut arena| {
+        let Grid { plan, exchange, contact, .. } = &mut self.grid;
+        contact.scatter_and_sum((plan, exchange), &mut self.phases, &self.chunks, |(), bin, mut arena| {
             arena.clear(&Window::FULL);
             let Ok(leaf) = all.binary_search_by_key(&bin.number, |leaf| leaf.bin) else { return };
             for (number, foot) in all[leaf].feet.iter().enumerate() {
@@ -262,13 +259,14 @@ impl<const D: usize> Solver<D> {
         field: usize,
         all: &[LeafFeet<D>],
         covered: &Covered,
-        other: &mut VelocityField<D>,
         rates: &[Rate<D>],
         sums: &mut [[ExactSum; SUMS]],
     ) {
-        for_real_nodes(&mut self.grid.fields, &self.grid.plan, |node, row| *row = other.fields.rows[node]);
-        self.prolong();
-        let rows = &self.grid.fields.rows;
+        let Grid { plan, fields, exchange, contact, inside_still, inside_moving, .. } = &mut self.grid;
+        let own = &mut fields[field].nodes.rows;
+        for_real_nodes(&mut contact.nodes, plan, |node, row| *row = own[node]);
+        contact.prolong(plan, &mut self.phases);
+        let rows = &contact.nodes.rows;
         let of_feet = |(leaf, covered): (&LeafFeet<D>, &Vec<f64>)| -> Vec<[f64; 4]> {
             let each = leaf.feet.iter().zip(covered);
             each.map(|(foot, covered)| {
@@ -276,7 +274,7 @@ impl<const D: usize> Solver<D> {
                     return [0.0; 4];
                 }
                 let [x, y, z, mass] = foot.gather(rows).map(|sum| sum / covered);
-                match other.fields.rows[foot.node[1]].0[3] <= mass {
+                match own[foot.node[1]].0[3] <= mass {
                     true => [x, y, z, 1.0],
                     false => [0.0, 0.0, 0.0, HEAVY],
                 }
@@ -284,12 +282,11 @@ impl<const D: usize> Solver<D> {
             .collect()
         };
         let velocities: Vec<Vec<[f64; 4]>> = all.iter().zip(covered).map(of_feet).collect();
-        let plan = &self.grid.plan;
         let is_real =
             |row: usize| plan.blocks[row / block_nodes(D)].real_nodes() >> (row % block_nodes(D)) & 1 == 1;
         let real: Vec<Vec<bool>> =
             all.iter().map(|leaf| leaf.feet.iter().map(|foot| is_real(foot.node[1])).collect()).collect();
-        self.grid.scatter_and_sum(&mut self.phases, &self.chunks, |(), bin, mut arena| {
+        contact.scatter_and_sum((plan, exchange), &mut self.phases, &self.chunks, |(), bin, mut arena| {
             arena.clear(&Window::FULL);
             let Ok(leaf) = all.binary_search_by_key(&bin.number, |leaf| leaf.bin) else { return };
             for (number, foot) in all[leaf].feet.iter().enumerate().filter(|(number, _)| real[leaf][*number])
@@ -299,11 +296,9 @@ impl<const D: usize> Solver<D> {
             }
         });
         let (physics, states) = (&self.physics, &self.contacts.states);
-        let Grid { plan, fields, inside_still, inside_moving, .. } = &mut self.grid;
         let mut touches = Vec::new();
-        let rows = &mut other.fields.rows;
-        for_real_nodes(fields, plan, |node, sum| {
-            let row = &mut rows[node];
+        for_real_nodes(&mut contact.nodes, plan, |node, sum| {
+            let row = &mut own[node];
             let [.., count] = sum.0;
             if count == 0.0 || row.0[3] <= 0.0 {
                 return;
