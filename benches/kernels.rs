@@ -108,7 +108,7 @@ fn scatter<const D: usize>(bencher: Bencher, model: Model, distinct: usize) {
         for chunk in setting.chunks.iter().cycle().take(blocks::<D>()) {
             arena.fill(Row::default());
             let (frame, scheme, scratch, arena) = (&setting.frame, &scheme, &mut scratch, &mut arena[..]);
-            p2g::Scatter { scratch, chunk, frame, scheme, dt: DT, arena, moments: None }
+            p2g::Scatter { scratch, chunk, given: &[], frame, scheme, dt: DT, arena, moments: None }
                 .whole_boxes(Select::All, Place::default());
         }
         arena[100 % arena_nodes(D)]
@@ -172,7 +172,7 @@ fn p2g_3d_level_mix(bencher: Bencher, (quarters, jump): (u32, bool)) {
             arena.fill(Row::default());
             let moments = jump.then_some(p2g::MomentSums { nodes: &nodes, sums: &mut [] });
             let (frame, scheme, scratch, arena) = (&setting.frame, &scheme, &mut scratch, &mut arena[..]);
-            p2g::Scatter { scratch, chunk, frame, scheme, dt: DT, arena, moments }
+            p2g::Scatter { scratch, chunk, given: &[], frame, scheme, dt: DT, arena, moments }
                 .whole_boxes(Select::List(&list), Place::default());
         }
         arena[100]

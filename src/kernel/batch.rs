@@ -1,5 +1,5 @@
 //! Batches of particles of a chunk and their columns as lanes.
-use super::Select;
+use super::{GivenColumn, Select};
 use crate::particle::chunk::{Chunk, Layout, Place, TILE};
 use crate::simd::{LANES, Vector, VectorMask, prefetch, prefetch_to_second_level};
 
@@ -192,6 +192,35 @@ impl Batch {
             return &spare.0[..Layout::<D>::REALS];
         };
         &tiles[tile as usize * Layout::<D>::REALS..][..Layout::<D>::REALS]
+    }
+
+    /// The particles' tile, all columns, in `spare` if it has no tile of its own or columns are given.
+    #[inline(always)]
+    pub(super) fn tile_to_scatter<'a, const D: usize>(
+        &self,
+        tiles: &'a [[f64; LANES]],
+        given: &[GivenColumn],
+        spare: &'a mut Tile,
+    ) -> &'a [[f64; LANES]] {
+        if given.is_empty() {
+            return self.tile::<D>(tiles, 0..Layout::<D>::REALS, spare);
+        }
+        self.bring_given::<D>(tiles, given, spare);
+        &spare.0[..Layout::<D>::REALS]
+    }
+
+    #[inline(never)]
+    fn bring_given<const D: usize>(&self, tiles: &[[f64; LANES]], given: &[GivenColumn], spare: &mut Tile) {
+        match self.tile {
+            None => self.bring_together::<D>(tiles, 0..Layout::<D>::REALS, spare),
+            Some(tile) => {
+                let own = &tiles[tile as usize * Layout::<D>::REALS..][..Layout::<D>::REALS];
+                spare.0[..Layout::<D>::REALS].copy_from_slice(own);
+            }
+        }
+        for GivenColumn { column, values } in given {
+            spare.0[*column] = self.index.map(|p| values[p as usize]);
+        }
     }
 
     /// The particles' tile, all columns, to be changed. A gathered one has to be put back.

@@ -16,6 +16,7 @@
 use bytemuck::{Pod, Zeroable};
 
 use self::batch::Batch;
+pub use self::given::GivenColumn;
 pub use self::select::Select;
 use crate::material::{Material, Viscosity};
 use crate::particle::chunk::Tag;
@@ -25,6 +26,7 @@ mod batch;
 pub mod constrained_nodes;
 pub mod domain;
 pub mod g2p;
+mod given;
 pub mod hanging;
 pub mod p2g;
 mod select;

@@ -23,7 +23,7 @@ use super::batch::{Batch, Batches, Tile, lanes_in};
 use super::constrained_nodes::ConstrainedNodes;
 use super::hanging::HangingNodes;
 use super::weights::{NodeWeights, Weights, add_products};
-use super::{ARENA_EDGE, Frame, Row, Scheme, Select, SubBox, Transfer, domain};
+use super::{ARENA_EDGE, Frame, GivenColumn, Row, Scheme, Select, SubBox, Transfer, domain};
 use crate::particle::chunk::{Chunk, Layout, Place};
 use crate::particle::volume::box_volume;
 use crate::simd::{F64x4, Kernel, LANES, Lanes, Vector, widest};
@@ -55,6 +55,8 @@ pub struct Scatter<'a, const D: usize> {
     pub scratch: &'a mut Scratch<D>,
     /// Particles of the leaf.
     pub chunk: &'a Chunk<D>,
+    /// Columns that are given in place of theirs: of masses, velocities or stress; none as a rule.
+    pub given: &'a [GivenColumn],
     /// The block.
     pub frame: &'a Frame<D>,
     /// Properties of the run, the same for all particles.
@@ -72,20 +74,20 @@ impl<const D: usize> Scatter<'_, D> {
     /// Adds the selected particles. Each particle's box must lie within the arena, which holds when its
     /// centre lies in the block. `next` is the place of the chunk that will be read after this one.
     pub fn whole_boxes(&mut self, select: Select, next: Place) {
-        let Self { scratch, chunk, frame, scheme, dt, arena, moments } = self;
+        let Self { scratch, chunk, given, frame, scheme, dt, arena, moments } = self;
         // By value, so that the kernel holds each of them in a register.
         let moments = moments.as_mut().map(|MomentSums { nodes, sums }| MomentSums { nodes, sums });
-        let bin = Scatter { scratch, chunk, frame, scheme, dt: *dt, arena, moments };
+        let bin = Scatter { scratch, chunk, given, frame, scheme, dt: *dt, arena, moments };
         widest(WholeBoxes { bin, select, next });
     }
 
     /// Adds parts of boxes; the affine term is relative to the particle.
     pub fn sub_boxes(&mut self, parts: &[SubBox<D>]) {
-        let Self { scratch, chunk, frame, scheme, dt, arena, moments } = self;
+        let Self { scratch, chunk, given, frame, scheme, dt, arena, moments } = self;
         let Scratch { prepared, nodes, spare } = &mut **scratch;
         for parts in parts.chunks(LANES) {
             let batch = Batch::from_indices(parts, |part| part.particle);
-            let tile = batch.tile::<D>(chunk.tiles(), 0..Layout::<D>::REALS, spare);
+            let tile = batch.tile_to_scatter::<D>(chunk.tiles(), given, spare);
             prepared.weights.fill_parts(scheme.coordinates, frame, &batch.positions(tile), parts);
             let spread = std::array::from_fn(|axis| SubBox::lane(parts, |part| part.spread[axis]).to_array());
             prepared.load::<Lanes>(tile, &batch, *dt, scheme, &spread);
@@ -129,14 +131,14 @@ impl<const D: usize> Kernel for WholeBoxes<'_, D> {
 impl<const D: usize> WholeBoxes<'_, D> {
     #[inline(always)]
     fn add_all<V: Vector, const AT_WALL: bool, const HAS_MOMENTS: bool>(self) {
-        let Scatter { scratch, chunk, frame, scheme, dt, arena, moments } = self.bin;
+        let Scatter { scratch, chunk, given, frame, scheme, dt, arena, moments } = self.bin;
         let mut moments = if HAS_MOMENTS { moments } else { None };
         let (tags, cell) = (chunk.tags(), frame.cell);
         let Scratch { prepared, nodes, spare } = scratch;
         let mut batches = Batches::new(self.select, chunk, self.next);
         while let Some(batch) = batches.next() {
             batches.look_up_pages();
-            let tile = batch.tile::<D>(chunk.tiles(), 0..Layout::<D>::REALS, spare);
+            let tile = batch.tile_to_scatter::<D>(chunk.tiles(), given, spare);
             let position: [V; D] = batch.positions(tile);
             let whole = domain::whole_of_batch(tile, tags, &batch, 0.5 * cell, scheme);
             let half = match AT_WALL {

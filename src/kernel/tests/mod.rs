@@ -10,6 +10,7 @@ use crate::material::{Material, Parameters};
 use crate::particle::chunk::{Chunk, Layout, Place, Tag};
 
 mod beside_coarser;
+mod given;
 mod leavers;
 mod parts;
 
@@ -52,7 +53,7 @@ fn scatter<const D: usize>(
     next: Place,
 ) {
     let scratch = &mut Default::default();
-    p2g::Scatter { scratch, chunk, frame, scheme, dt, arena, moments }.whole_boxes(select, next);
+    p2g::Scatter { scratch, chunk, given: &[], frame, scheme, dt, arena, moments }.whole_boxes(select, next);
 }
 
 /// A small deterministic generator of numbers in [0, 1).

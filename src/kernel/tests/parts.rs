@@ -51,6 +51,7 @@ fn parts_equal_the_whole<const D: usize>() {
     let mut bin = p2g::Scatter {
         scratch,
         chunk: &parted,
+        given: &[],
         frame: &frame,
         scheme: &scheme,
         dt: DT,
@@ -328,7 +329,7 @@ fn bits_do_not_depend_on_earlier_bins() {
             let place = Place::default();
             let (frame, scheme, dt) = (&frame, &scheme, DT);
             let (scratch, rows) = (&mut to_nodes, &mut arena[..]);
-            p2g::Scatter { scratch, chunk, frame, scheme, dt, arena: rows, moments: None }
+            p2g::Scatter { scratch, chunk, given: &[], frame, scheme, dt, arena: rows, moments: None }
                 .whole_boxes(Select::All, place);
             let fields = &Fields { velocity, increment: None, fill: None, moments: None };
             let (scratch, leavers) = (&mut to_particles, &mut leavers);

@@ -171,7 +171,7 @@ impl<const D: usize> GivenBoxes<D> {
         let Grid { plan, fields, exchange, .. } = &mut solver.grid;
         let on = (&*plan, &exchange.seam);
         let sorted = fields[0].sort(on, &mut solver.phases, &solver.chunks, widths, None);
-        solver.nodes_from_particles(dt);
+        solver.nodes_from_particles(dt, &[]);
         sorted
     }
 

@@ -58,7 +58,7 @@ impl<const D: usize> Solver<D> {
     /// A particle whose box cannot be transferred, on the rank that has it.
     pub fn grid_totals(&mut self) -> Result<GridTotals, StepError> {
         let sorted = self.sort_into_bins();
-        self.nodes_from_particles(0.0);
+        self.nodes_from_particles(0.0, &[]);
         self.note_surface();
 
         let plan = &self.grid.plan;

@@ -9,7 +9,7 @@ use super::multigrid::Multigrid;
 use super::points::{Points, Sweep};
 use super::unknowns::{Nodal, Unknowns};
 use super::walls::Springs;
-use crate::kernel::{Row, Scheme};
+use crate::kernel::{GivenColumn, Row, Scheme};
 use crate::solver::state::grid::Grid;
 use crate::solver::state::inside::dot;
 use crate::solver::state::{Effort, Solver};
@@ -222,7 +222,7 @@ impl<const D: usize> Solver<D> {
             return None;
         }
         let mut stiffness: Vec<f64> = Vec::with_capacity(way.len());
-        let mut rest = self.forces(unknowns, |row, cell| stiffness.push(row / (cell * cell)));
+        let mut rest = self.forces(unknowns, &[], |row, cell| stiffness.push(row / (cell * cell)));
         unknowns.gather_stiffness(&mut stiffness);
         let (mut inner, mut outer) = (rest.clone(), outer.clone());
         unknowns.add_friction(&way, &mut outer);
@@ -248,14 +248,19 @@ impl<const D: usize> Solver<D> {
         self.prolong(0);
     }
 
-    /// Collective over neighbours. Forces of the particles' affine columns on the nodes; `note` gets the sum
-    /// of their masses at each, and the edge of its cells.
-    pub(super) fn forces(&mut self, unknowns: &Unknowns<D>, mut note: impl FnMut(f64, f64)) -> Nodal<D> {
+    /// Collective over neighbours. Forces of the particles' affine columns on the nodes, with these columns in
+    /// place of their own; `note` gets the sum of their masses at each, and the edge of its cells.
+    pub(super) fn forces(
+        &mut self,
+        unknowns: &Unknowns<D>,
+        given: &[Vec<GivenColumn>],
+        mut note: impl FnMut(f64, f64),
+    ) -> Nodal<D> {
         let (chunks, times) = (&self.chunks, &self.leaf_data.times);
         let scheme = Scheme { forces: true, ..self.physics.scheme() };
         let Grid { plan, fields, exchange, .. } = &mut self.grid;
         fields[0].scatter_and_sum((plan, exchange), &mut self.phases, chunks, |scratch, bin, arena| {
-            times.time(bin.leaf, || scatter(scratch, bin, chunks, &scheme, 1.0, arena));
+            times.time(bin.leaf, || scatter(scratch, bin, (chunks, given), &scheme, 1.0, arena));
         });
         let rows = &fields[0].nodes.rows;
         let all = unknowns.nodes.iter().zip(&unknowns.cells).map(|(&node, &cell)| {
@@ -279,7 +284,7 @@ impl<const D: usize> Solver<D> {
         unknowns.spread_ties(&mut way);
         self.show(unknowns, &way);
         self.stress_of_displacements(points, Sweep::Change);
-        let mut forces = self.forces(unknowns, |_, _| ());
+        let mut forces = self.forces(unknowns, &[], |_, _| ());
         forces.iter_mut().flatten().for_each(|force| *force = -*force);
         for (node, spring) in springs {
             (0..D).for_each(|a| forces[*node][a] += dot(&spring[a], &way[*node]));

@@ -148,7 +148,7 @@ impl<const D: usize> Solver<D> {
         let phases = self.phases;
         // A box without a bin is reported by the next step, which fails.
         let _ = self.sort_into_bins();
-        self.nodes_from_particles(0.0);
+        self.nodes_from_particles(0.0, &[]);
         let rates = self.collider_rates(0.0);
         let _ = self.update_node_velocities(Lengths::NONE, &rates);
         self.phases = phases;

@@ -11,9 +11,8 @@
 use rayon::prelude::*;
 
 use super::node_update::{Faces, apply_faces, update_velocity};
-use crate::kernel::{Row, Transfer};
+use crate::kernel::{GivenColumn, Row, Transfer};
 use crate::memory::Block;
-use crate::particle::Chunk;
 use crate::particle::chunk::Layout;
 use crate::solver::state::Solver;
 use crate::solver::state::grid::Grid;
@@ -29,16 +28,25 @@ fn subtract(to: &mut [Row], from: &[Row]) {
     });
 }
 
+/// Columns of a leaf that are given, and these velocities of its particles.
+fn with_velocities<const D: usize>(mut given: Vec<GivenColumn>, velocities: &[[f64; D]]) -> Vec<GivenColumn> {
+    given.extend((0..D).map(|axis| {
+        let values = velocities.iter().map(|velocity| velocity[axis]).collect();
+        GivenColumn { column: Layout::<D>::VELOCITY + axis, values }
+    }));
+    given
+}
+
 impl<const D: usize> Solver<D> {
     /// Before P2G: velocities of the nodes of a velocity field without the impulse of stress, for transfers and
-    /// for loads that need them.
-    pub(in crate::solver) fn note_velocities(&mut self, field: usize) {
+    /// for loads that need them. Masses may be given in place of those of the particles.
+    pub(super) fn note_velocities(&mut self, field: usize, given: &[Vec<GivenColumn>]) {
         let time = self.clock.time;
         let absorbs = self.physics.absorbing.as_flattened().iter().any(Option::is_some);
         let damps = self.physics.loads.iter().any(|load| load.needs_start() && load.is_active(time));
         let is_needed = absorbs || damps;
         if is_needed {
-            self.scatter_velocities(field);
+            self.scatter_velocities(field, given);
             let VelocityField { nodes, increments, .. } = &mut self.grid.fields[field];
             increments.start.clone_from(&nodes.rows);
         }
@@ -48,20 +56,21 @@ impl<const D: usize> Solver<D> {
             Transfer::Xpic { order } => Some(order),
         };
         if order != Some(1) && !is_needed {
-            self.scatter_velocities(field);
+            self.scatter_velocities(field, given);
         }
         let VelocityField { nodes, increments: Increments { base, .. }, .. } = &mut self.grid.fields[field];
         let Some(order) = order else { return base.clone_from(&nodes.rows) };
         base.resize(nodes.rows.len());
         base.fill(Row::default());
+        let given_of = |leaf: usize| given.get(leaf).cloned().unwrap_or_default();
         let mut rest = if order > 1 { nodes.rows.clone() } else { Block::default() };
         for _ in 1..order {
             self.grid.fields[field].nodes.rows.copy_from_slice(&rest);
             self.prolong(field);
-            let mut other = self.interpolate(field);
-            self.swap_velocities(&mut other);
-            self.scatter_velocities(field);
-            self.swap_velocities(&mut other);
+            let velocities = self.interpolate(field);
+            let given = velocities.par_iter().enumerate().with_min_len(8);
+            let given = given.map(|(leaf, velocities)| with_velocities(given_of(leaf), velocities));
+            self.scatter_velocities(field, &given.collect::<Vec<_>>());
             let VelocityField { nodes, increments, .. } = &mut self.grid.fields[field];
             subtract(&mut rest, &nodes.rows);
             subtract(&mut increments.base, &rest);
@@ -88,20 +97,9 @@ impl<const D: usize> Solver<D> {
     }
 
     /// S⁺: velocities of the nodes from those of the particles alone.
-    fn scatter_velocities(&mut self, field: usize) {
-        self.field_from_particles(field, 0.0);
+    fn scatter_velocities(&mut self, field: usize, given: &[Vec<GivenColumn>]) {
+        self.field_from_particles(field, 0.0, given);
         let Grid { plan, fields, .. } = &mut self.grid;
         self.phases.time(Phase::Nodes, || update_velocity(&mut fields[field].nodes, plan, [0.0; D], 0.0));
-    }
-
-    /// Exchanges the velocities of all particles with those given, leaf by leaf.
-    fn swap_velocities(&mut self, other: &mut [Vec<[f64; D]>]) {
-        let swap = |(chunk, other): (&mut Chunk<D>, &mut Vec<[f64; D]>)| {
-            for axis in 0..D {
-                let column = chunk.column_mut(Layout::<D>::VELOCITY + axis);
-                column.into_iter().zip(other.iter_mut()).for_each(|(v, o)| std::mem::swap(v, &mut o[axis]));
-            }
-        };
-        self.chunks.par_iter_mut().zip(other).with_min_len(8).for_each(swap);
     }
 }

@@ -3,7 +3,7 @@ use rayon::prelude::*;
 
 use crate::grid::arenas::ArenaMut;
 use crate::kernel::p2g::{self, MomentSums};
-use crate::kernel::{Scheme, Transfer, spread};
+use crate::kernel::{GivenColumn, Scheme, Transfer, spread};
 use crate::leapfrog::Lengths;
 use crate::particle::Chunk;
 use crate::particle::chunk::{Layout, Place, Tag};
@@ -34,28 +34,26 @@ impl<const D: usize> Solver<D> {
     /// `p_j` without forces. Δt is the kick. With mass scaling m is the mass with which a particle moves.
     pub(in crate::solver) fn particles_to_nodes(&mut self, lengths: Lengths) {
         self.scatter_volumes();
-        self.scale_masses(|mass, scale| mass * scale);
-        (0..self.grid.fields.len()).for_each(|field| self.note_velocities(field));
-        let before = self.push_particles(lengths);
-        self.nodes_from_particles(lengths.kick);
-        self.take_back_push(&before);
-        self.scale_masses(|mass, scale| mass / scale);
+        let mut given = self.scaled_masses();
+        (0..self.grid.fields.len()).for_each(|field| self.note_velocities(field, &given));
+        self.push_particles(lengths, &mut given);
+        self.nodes_from_particles(lengths.kick, &given);
     }
 
     /// Collective over neighbours. Momentum with the impulse of stress over `dt`, and mass, on real nodes, in
-    /// each velocity field.
-    pub(in crate::solver) fn nodes_from_particles(&mut self, dt: f64) {
+    /// each velocity field; of particles with these columns in place of their own.
+    pub(in crate::solver) fn nodes_from_particles(&mut self, dt: f64, given: &[Vec<GivenColumn>]) {
         let before = self.grid.exchange.arenas.traffic().bytes;
-        (0..self.grid.fields.len()).for_each(|field| self.field_from_particles(field, dt));
+        (0..self.grid.fields.len()).for_each(|field| self.field_from_particles(field, dt, given));
         self.grid.sum_bytes = self.grid.exchange.arenas.traffic().bytes - before;
     }
 
     /// As [`Solver::nodes_from_particles`] in one velocity field.
-    pub(super) fn field_from_particles(&mut self, field: usize, dt: f64) {
+    pub(super) fn field_from_particles(&mut self, field: usize, dt: f64, given: &[Vec<GivenColumn>]) {
         let (chunks, times, scheme) = (&self.chunks, &self.leaf_data.times, self.physics.scheme());
         let Grid { plan, fields, exchange, .. } = &mut self.grid;
         fields[field].scatter_and_sum((plan, exchange), &mut self.phases, chunks, |scratch, bin, arena| {
-            times.time(bin.leaf, || scatter(scratch, bin, chunks, &scheme, dt, arena));
+            times.time(bin.leaf, || scatter(scratch, bin, (chunks, given), &scheme, dt, arena));
         });
     }
 
@@ -95,20 +93,22 @@ impl<const D: usize> Solver<D> {
     }
 }
 
-/// Scatters mass, affine momentum and the impulse of stress of the members of a bin into its arena.
+/// Scatters mass, affine momentum and the impulse of stress of the members of a bin into its arena. Leaf by leaf,
+/// columns may be given in place of those of the particles.
 pub(in crate::solver) fn scatter<const D: usize>(
     scratch: &mut p2g::Scratch<D>,
     bin: &BinView<'_, D>,
-    chunks: &[Chunk<D>],
+    (chunks, given): (&[Chunk<D>], &[Vec<GivenColumn>]),
     scheme: &Scheme<'_>,
     dt: f64,
     mut arena: ArenaMut<'_, D>,
 ) {
     arena.clear(&bin.window);
-    let chunk = &chunks[bin.leaf];
+    let (chunk, given) = (&chunks[bin.leaf], given.get(bin.leaf).map_or(&[][..], Vec::as_slice));
     let ArenaMut { rows, moments: sums, .. } = arena;
     let moments = bin.constrained.map(|nodes| MomentSums { nodes, sums });
-    let mut kernel = p2g::Scatter { scratch, chunk, frame: &bin.frame, scheme, dt, arena: rows, moments };
+    let frame = &bin.frame;
+    let mut kernel = p2g::Scatter { scratch, chunk, given, frame, scheme, dt, arena: rows, moments };
     if let Some(whole) = bin.whole {
         kernel.whole_boxes(whole, chunks.get(bin.leaf + 1).map_or(Place::default(), Chunk::place));
     }

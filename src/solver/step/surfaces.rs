@@ -115,7 +115,7 @@ impl<const D: usize> Solver<D> {
             let (phases, on) = (&mut self.phases, (&*plan, &exchange.seam));
             let sorted = sums.sort(on, phases, copies, (&widths, scheme.coordinates), None);
             sums.scatter_and_sum((plan, exchange), phases, copies, |scratch, bin, arena| {
-                scatter(scratch, bin, copies, &scheme, 1.0, arena);
+                scatter(scratch, bin, (copies, &[]), &scheme, 1.0, arena);
             });
             sorted
         };

@@ -2,22 +2,22 @@
 //! their pores, and body forces that belong to places of the undeformed body. With mass scaling gravity and
 //! all body forces are among them: they act on the mass of the material, not on the scaled mass.
 //!
-//! A particle's force f goes to the nodes with the weights of its mass: `p_j += w Δt f`. So for P2G the
-//! particle has the velocity `v + Δt f / m`, and its own again afterwards: the force passes through parts of
-//! boxes and constrained nodes like momentum, and no kernel handles loads.
+//! A particle's force f goes to the nodes with the weights of its mass: `p_j += w Δt f`. So P2G is given the
+//! velocity `v + Δt f / m` in place of the particle's own: the force passes through parts of boxes and
+//! constrained nodes like momentum, and no kernel handles loads.
 //!
 //! A force on a surface acts at the surface, with the moment `M = f ⊗ d` by its way d from the centre of the
 //! particle: to first order nodes get `Δt (w f + M ∇w)`, so that uniform stress balances a uniform load to
 //! round-off where boxes tile cells. At the centres it would leave half of the load in the outermost row. The
-//! second term is that of a stress `−M / V₀`, which the particle has for P2G: of M the symmetric part, and
-//! all of it in load steps. The work is `f · Δx + Δt M : ∇v` with the displacement Δx of the particle, which
+//! second term is that of a stress `−M / V₀`, which P2G is given with that of the particle: of M the symmetric
+//! part, and all of it in load steps. The work is `f · Δx + Δt M : ∇v` with the displacement Δx of the particle, which
 //! `follow` finds.
 pub(super) mod follow;
 
 use rayon::prelude::*;
 
 use crate::exact_sum::ExactSum;
-use crate::kernel::Coordinates;
+use crate::kernel::{Coordinates, GivenColumn};
 use crate::leapfrog::Lengths;
 use crate::load::{Carried, Kind, Load};
 use crate::particle::chunk::{Chunk, Layout, Tag};
@@ -29,21 +29,6 @@ use crate::solver::sorting::box_widths::BoxWidths;
 use crate::solver::state::Solver;
 use crate::solver::state::bookings::{CarriedTotals, ParticlePush};
 use crate::solver::state::phases::Phase;
-
-/// A particle before an impulse.
-pub(in crate::solver) struct Unpushed<const D: usize> {
-    particle: u32,
-    velocity: [f64; D],
-    /// Where a force acts at a surface.
-    stress: Option<Stress>,
-}
-
-/// Stress that a particle has for P2G: its first column, the number of columns, and their values, Pa.
-struct Stress {
-    first: usize,
-    count: usize,
-    values: [f64; 9],
-}
 
 /// Greatest number of columns that a particle carries for a load.
 const MOST: usize = 4;
@@ -69,33 +54,10 @@ fn surface_at<const D: usize>(
     std::array::from_fn(|a| x[a] + way[a])
 }
 
-/// Adds `−M / V₀` with the moments M of some forces to the stress that a particle has for P2G. Returns what
-/// it was.
-fn push_stress<const D: usize>(
-    chunk: &mut Chunk<D>,
-    p: usize,
-    pushes: &[ParticlePush<D>],
-    is_in_steps: bool,
-) -> Stress {
-    let [half] = chunk.read(Layout::<D>::HALF, p);
-    let volume = box_volume::<D>(half);
-    let moment = |i: usize, k: usize| pushes.iter().map(|push| push.moment[i][k]).sum::<f64>() / volume;
-    let (first, count) = match is_in_steps {
-        true => (Layout::<D>::AFFINE, D * D),
-        false => (Layout::<D>::STRESS, 6),
-    };
-    let column = |c: usize| if c < count { chunk.column(first + c)[p] } else { 0.0 };
-    let before = Stress { first, count, values: std::array::from_fn(column) };
-    let mut after = before.values;
-    for (i, k) in (0..D).flat_map(|i| (0..D).map(move |k| (i, k))) {
-        match is_in_steps {
-            true => after[D * i + k] -= moment(i, k),
-            false if i == k => after[i] -= moment(i, i),
-            false => after[i + k + 2] -= 0.5 * moment(i, k),
-        }
-    }
-    chunk.write(first, p, &after[..count]);
-    before
+/// Columns of a leaf from `first` on, as many as `count`, to be given with changed values in place of its own.
+fn columns<const D: usize>(chunk: &Chunk<D>, first: usize, count: usize) -> Vec<GivenColumn> {
+    let values = |column: usize| chunk.column(column).iter().copied().collect();
+    (first..first + count).map(|column| GivenColumn { column, values: values(column) }).collect()
 }
 
 /// Half widths of the box of a particle in a leaf with cells of this edge, m.
@@ -134,43 +96,76 @@ struct Pushing<'a, const D: usize> {
 }
 
 impl<const D: usize> Pushing<'_, D> {
-    /// Applies the impulses to the particles of a leaf with cells of this edge (m), which move with `scale`
-    /// times their mass. Returns their velocities before, and adds the forces to `pushes`.
+    /// Adds the forces on the particles of a leaf with cells of this edge (m), which move with `scale` times
+    /// their mass, to `pushes`. Returns their velocities after the impulses and, where forces act at surfaces,
+    /// their stress with that of the moments; nothing where no force acts.
     fn push(
         &self,
-        chunk: &mut Chunk<D>,
+        chunk: &Chunk<D>,
         cell: f64,
         scale: f64,
         pushes: &mut Vec<ParticlePush<D>>,
-    ) -> Vec<Unpushed<D>> {
-        let mut before = Vec::new();
+    ) -> Vec<GivenColumn> {
+        let (mut velocities, mut stress) = (Vec::new(), Vec::new());
         let has_water = self.loads.iter().any(|(_, load)| matches!(load.kind, Kind::Water(_)));
         let boxes = if has_water { self.widths.of_leaf(chunk, cell) } else { Vec::new() };
         for p in 0..chunk.len() {
             let from = pushes.len();
-            let mass = chunk.column(Layout::<D>::MASS)[p];
+            let own_mass = chunk.column(Layout::<D>::MASS)[p];
+            // The scale is a power of two.
+            let mass = own_mass * scale;
             for &(number, load) in &self.loads {
-                if let Some((force, moment)) = self.force(chunk, p, load, (cell, boxes.get(p)), mass / scale)
-                {
+                if let Some((force, moment)) = self.force(chunk, p, load, (cell, boxes.get(p)), own_mass) {
                     let (particle, load, way) = (p as u32, number as u32, chunk.position(p));
                     pushes.push(ParticlePush { particle, load, force, moment, way, turn: 0.0 });
                 }
             }
             if self.all || from < pushes.len() {
-                let velocity: [f64; D] = chunk.read(Layout::<D>::VELOCITY, p);
                 let pushes = &pushes[from..];
-                let is_at_surface = pushes.iter().any(|push| push.moment != [[0.0; D]; D]);
-                let stress = is_at_surface.then(|| push_stress(chunk, p, pushes, self.is_in_steps));
-                before.push(Unpushed { particle: p as u32, velocity, stress });
+                if pushes.iter().any(|push| push.moment != [[0.0; D]; D]) {
+                    self.add_moments(chunk, p, pushes, &mut stress);
+                }
+                let velocity: [f64; D] = chunk.read(Layout::<D>::VELOCITY, p);
                 let falling =
                     std::array::from_fn(|a| (self.kick / scale).mul_add(self.on_particles[a], velocity[a]));
                 let pushed = pushes.iter().fold(falling, |velocity: [f64; D], push| {
                     std::array::from_fn(|a| self.kick.mul_add(push.force[a] / mass, velocity[a]))
                 });
-                chunk.write(Layout::<D>::VELOCITY, p, &pushed);
+                if velocities.is_empty() {
+                    velocities = columns(chunk, Layout::<D>::VELOCITY, D);
+                }
+                velocities.iter_mut().zip(pushed).for_each(|(column, value)| column.values[p] = value);
             }
         }
-        before
+        velocities.append(&mut stress);
+        velocities
+    }
+
+    /// Adds `−M / V₀` with the moments M of some forces to the stress of a particle, in columns that are those
+    /// of the leaf at first.
+    fn add_moments(
+        &self,
+        chunk: &Chunk<D>,
+        p: usize,
+        pushes: &[ParticlePush<D>],
+        stress: &mut Vec<GivenColumn>,
+    ) {
+        let [half] = chunk.read(Layout::<D>::HALF, p);
+        let volume = box_volume::<D>(half);
+        let moment = |i: usize, k: usize| pushes.iter().map(|push| push.moment[i][k]).sum::<f64>() / volume;
+        if stress.is_empty() {
+            *stress = match self.is_in_steps {
+                true => columns(chunk, Layout::<D>::AFFINE, D * D),
+                false => columns(chunk, Layout::<D>::STRESS, Layout::<D>::SYMMETRIC),
+            };
+        }
+        for (i, k) in (0..D).flat_map(|i| (0..D).map(move |k| (i, k))) {
+            match self.is_in_steps {
+                true => stress[D * i + k].values[p] -= moment(i, k),
+                false if i == k => stress[i].values[p] -= moment(i, i),
+                false => stress[i + k + 2].values[p] -= 0.5 * moment(i, k),
+            }
+        }
     }
 
     /// Volume (m³) of a particle of this mass (kg) where its material has its density. Water that comes as
@@ -227,15 +222,15 @@ fn displacement<const D: usize>(chunk: &Chunk<D>, first: Option<usize>, p: usize
 }
 
 impl<const D: usize> Solver<D> {
-    /// Not collective. Gives particles the impulse of the forces on them, for P2G. Returns what they were
-    /// before, by leaf, for [`Solver::take_back_push`]; empty if no force acts.
-    pub(in crate::solver) fn push_particles(&mut self, lengths: Lengths) -> Vec<Vec<Unpushed<D>>> {
+    /// Not collective. Adds the columns with which particles scatter the impulse of the forces on them, leaf by
+    /// leaf; none if no force acts.
+    pub(in crate::solver) fn push_particles(&mut self, lengths: Lengths, given: &mut Vec<Vec<GivenColumn>>) {
         let (physics, time) = (&self.physics, self.clock.time);
         let scaled = physics.has_scaled_masses();
         let loads = physics.loads.iter().enumerate();
         let loads: Vec<_> = loads.filter(|(_, load)| load.acts_on_particles(scaled)).collect();
         if loads.is_empty() && !scaled {
-            return Vec::new();
+            return;
         }
         let middle = lengths.middle_of_kick(time);
         let plan = &self.grid.plan;
@@ -260,46 +255,33 @@ impl<const D: usize> Solver<D> {
             kick: lengths.kick,
         };
         self.particle_forces.loads.resize_with(self.chunks.len(), Vec::new);
-        let leaves =
-            self.chunks.par_iter_mut().zip(&mut self.particle_forces.loads).enumerate().with_min_len(32);
+        given.resize_with(self.chunks.len(), Vec::new);
+        let leaves = self.chunks.par_iter().zip(&mut self.particle_forces.loads).zip(given).enumerate();
         self.phases.time(Phase::Scatter, || {
-            let before = leaves.map(|(leaf, (chunk, pushes))| {
+            leaves.with_min_len(32).for_each(|(leaf, ((chunk, pushes), given))| {
                 pushes.clear();
-                match pushing.all || chunk.carried_columns() > 0 {
-                    false => Vec::new(),
-                    true => {
-                        let scale = physics.mass_scale(plan.finest_level(leaf)).unwrap_or(1.0);
-                        pushing.push(chunk, plan.finest_cell(leaf), scale, pushes)
-                    }
+                if pushing.all || chunk.carried_columns() > 0 {
+                    let scale = physics.mass_scale(plan.finest_level(leaf)).unwrap_or(1.0);
+                    given.append(&mut pushing.push(chunk, plan.finest_cell(leaf), scale, pushes));
                 }
             });
-            before.collect()
-        })
-    }
-
-    /// Not collective. Gives particles their scaled masses, or their own again, in stages with mass scaling.
-    /// Factors are powers of two, so no mass changes.
-    pub(in crate::solver) fn scale_masses(&mut self, change: fn(f64, f64) -> f64) {
-        if !self.physics.has_scaled_masses() {
-            return;
-        }
-        let (physics, plan) = (&self.physics, &self.grid.plan);
-        self.chunks.par_iter_mut().enumerate().with_min_len(32).for_each(|(leaf, chunk)| {
-            let scale = physics.mass_scale(plan.finest_level(leaf)).unwrap_or(1.0);
-            chunk.column_mut(Layout::<D>::MASS).into_iter().for_each(|mass| *mass = change(*mass, scale));
         });
     }
 
-    /// Not collective. Restores velocities and stress before the impulses.
-    pub(in crate::solver) fn take_back_push(&mut self, before: &[Vec<Unpushed<D>>]) {
-        for (chunk, before) in self.chunks.iter_mut().zip(before) {
-            for Unpushed { particle, velocity, stress } in before {
-                chunk.write(Layout::<D>::VELOCITY, *particle as usize, velocity);
-                if let Some(Stress { first, count, values }) = stress {
-                    chunk.write(*first, *particle as usize, &values[..*count]);
-                }
-            }
+    /// Not collective. Masses with which particles move, leaf by leaf, in stages with mass scaling; nothing in
+    /// others, where these are their own.
+    pub(super) fn scaled_masses(&self) -> Vec<Vec<GivenColumn>> {
+        let (physics, plan) = (&self.physics, &self.grid.plan);
+        if !physics.has_scaled_masses() {
+            return Vec::new();
         }
+        let leaves = self.chunks.par_iter().enumerate().with_min_len(32);
+        let masses = leaves.map(|(leaf, chunk)| {
+            let scale = physics.mass_scale(plan.finest_level(leaf)).unwrap_or(1.0);
+            let values = chunk.column(Layout::<D>::MASS).iter().map(|mass| mass * scale).collect();
+            vec![GivenColumn { column: Layout::<D>::MASS, values }]
+        });
+        masses.collect()
     }
 
     /// Not collective. Adds impulse and work of the forces on particles to the sums of the loads, after

@@ -101,7 +101,7 @@ impl<const D: usize> Solver<D> {
         let times = &self.leaf_data.times;
         let Grid { plan, exchange, contact, .. } = &mut self.grid;
         contact.scatter_and_sum((plan, exchange), &mut self.phases, chunks, |scratch, bin, arena| {
-            times.time(bin.leaf, || scatter(scratch, bin, chunks, &scheme, 0.0, arena));
+            times.time(bin.leaf, || scatter(scratch, bin, (chunks, &[]), &scheme, 0.0, arena));
         });
     }
 

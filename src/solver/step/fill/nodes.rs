@@ -6,7 +6,7 @@ use crate::boundary::Collider;
 use crate::grid::GridPlan;
 use crate::grid::mask::{bits, block_nodes};
 use crate::grid::sums::volumes::OfBlock;
-use crate::kernel::Coordinates;
+use crate::kernel::{Coordinates, GivenColumn};
 use crate::particle::chunk::{Chunk, Layout, Tag};
 use crate::particle::volume::{reference_volume, volume};
 use crate::solver::state::Solver;
@@ -23,29 +23,25 @@ impl<const D: usize> Solver<D> {
             return;
         }
         let physics = &self.physics;
-        let volumes = |chunk: &mut Chunk<D>| {
+        let volumes = |chunk: &Chunk<D>| {
             let of = |p: usize| match physics.materials[usize::from(Tag::unpack(chunk.tags()[p]).material)]
                 .is_fluid()
             {
                 true => reference_volume(chunk, p),
                 false => volume(chunk, p),
             };
-            let volumes: Vec<f64> = (0..chunk.len()).map(of).collect();
-            let masses = chunk.column_mut(Layout::<D>::MASS).into_iter().zip(volumes);
-            masses.map(|(mass, volume)| std::mem::replace(mass, volume)).collect::<Vec<f64>>()
+            let values = (0..chunk.len()).map(of).collect();
+            vec![GivenColumn { column: Layout::<D>::MASS, values }]
         };
-        let masses: Vec<Vec<f64>> = self.chunks.par_iter_mut().with_min_len(8).map(volumes).collect();
+        let given: Vec<_> = self.chunks.par_iter().with_min_len(8).map(volumes).collect();
         let mut scattered = Vec::new();
         for field in 0..self.grid.fields.len() {
             let mut sums = Vec::new();
             if self.physics.fill_densities[field].is_none() {
-                self.field_from_particles(field, 0.0);
+                self.field_from_particles(field, 0.0, &given);
                 sums.extend(self.grid.fields[field].nodes.rows.iter().map(|row| row.0[3]));
             }
             scattered.push(sums);
-        }
-        for (chunk, masses) in self.chunks.iter_mut().zip(masses) {
-            chunk.column_mut(Layout::<D>::MASS).into_iter().zip(masses).for_each(|(own, mass)| *own = mass);
         }
         let Grid { plan, fill, .. } = &mut self.grid;
         node_fill(fill, plan, self.physics.coordinates).scattered = scattered;
