@@ -50,6 +50,24 @@ fn nothing_is_felt_before_a_gap_closes() {
     }
 }
 
+/// Three bodies that meet move as they do without a collider that is far from all of them.
+#[test]
+fn a_collider_far_away_changes_nothing() {
+    let ends = |collider: &str| {
+        let job = format!(
+            "{RUBBER}[domain]\nsize = [1.6, 1.6]\nroot_edge = 0.2\n[tree]\nbase_level = 1\n{}{}{}\
+             [[contact]]\nfriction = 0.5\n{collider}[time]\nend = 0.05\n[history]\nevery_steps = 10\n",
+            body("low", &cube([0.4, 0.2], [1.2, 0.4]), "[0, 0]"),
+            body("left", "kind = 'circle', centre = [0.62, 0.62], radius = 0.2", "[0.5, -0.5]"),
+            body("right", "kind = 'circle', centre = [1.03, 0.62], radius = 0.2", "[-0.5, -0.5]"),
+        );
+        let history = history(&job);
+        ["kinetic_energy", "elastic_energy"].map(|name| history.column(name).to_vec())
+    };
+    let far = "[[colliders]]\nname = 'far'\nshape = { kind = 'box', min = [1.5, 1.5], max = [1.6, 1.6] }\n";
+    assert_eq!(ends(far), ends(""));
+}
+
 /// Two equal bars meet at 2 × 0.1 m/s: the stress between them is ρ c v, they part at 2 L / c with their
 /// velocities exchanged.
 #[test]

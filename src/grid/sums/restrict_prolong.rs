@@ -68,10 +68,11 @@ impl<const D: usize> NodeFields<D> {
     }
 
     /// Not collective. Gives the real nodes that occupied bins reach these rows, by number of the node, and
-    /// the constrained ones what they have of their parents.
+    /// the constrained ones what they have of their parents. Nothing is summed in any block then.
     pub fn spread(&mut self, plan: &GridPlan<D>, arenas: &Arenas<D>, row: impl Fn(usize) -> Row + Sync) {
         self.mark_needed(plan, arenas);
         let nodes = block_nodes(D);
+        self.active.fill(false);
         let blocks = self.rows.par_chunks_mut(nodes).zip(&mut self.dirty).zip(&self.needed).enumerate();
         blocks.with_min_len(64).for_each(|(index, ((rows, dirty), needed))| {
             if *needed || *dirty {

@@ -199,7 +199,7 @@ impl<const D: usize> Solver<D> {
         let has_increments = scheme.transfer.has_increments();
         let Grid { plan, fields, migration, fill, .. } = &mut self.grid;
         let (first, others) = fields.split_at_mut(1);
-        // Its lists are sorted for the next step while those of the others are read.
+        // Where it is the only one, its lists are sorted for the next step meanwhile.
         let VelocityField { nodes, arenas, increments, lists } = &mut first[0];
         let sweep = Sweep {
             dt,
