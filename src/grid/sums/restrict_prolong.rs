@@ -52,8 +52,8 @@ impl<const D: usize> NodeFields<D> {
         prolong(plan, &self.needed, &mut self.rows, &mut self.moments);
     }
 
-    /// Not collective. Prolongation of these rows of all nodes in place of those of the fields. The moments of
-    /// the fields become theirs.
+    /// Not collective. Prolongation of these rows of all nodes in place of those of the fields. The moments
+    /// of the fields become theirs.
     pub fn prolong_rows(&mut self, plan: &GridPlan<D>, arenas: &Arenas<D>, rows: &mut [Row]) {
         self.begin_prolong(plan, arenas);
         prolong(plan, &self.needed, rows, &mut self.moments);

@@ -248,8 +248,8 @@ impl<const D: usize> Solver<D> {
         self.prolong(0);
     }
 
-    /// Collective over neighbours. Forces of the particles' affine columns on the nodes, with these columns in
-    /// place of their own; `note` gets the sum of their masses at each, and the edge of its cells.
+    /// Collective over neighbours. Forces of the particles' affine columns on the nodes, with these columns
+    /// in place of their own; `note` gets the sum of their masses at each, and the edge of its cells.
     pub(super) fn forces(
         &mut self,
         unknowns: &Unknowns<D>,

@@ -20,7 +20,8 @@ use crate::solver::state::walls::Walls;
 pub struct Grid<const D: usize> {
     /// Blocks, bins and constraints.
     pub plan: GridPlan<D>,
-    /// Velocity fields by number: one of all particles, or one for each group of bodies with the same contacts.
+    /// Velocity fields by number: one of all particles, or one for each group of bodies with the same
+    /// contacts.
     pub(in crate::solver) fields: Vec<VelocityField<D>>,
     pub(in crate::solver) exchange: NodeExchange<D>,
     pub(in crate::solver) migration: Migration<D>,

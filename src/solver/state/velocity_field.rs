@@ -1,7 +1,7 @@
 //! Velocity fields: what the particles of a group of bodies scatter into and gather from.
 //!
-//! A field is acted on as it is: phases of a step take it, or its number in the grid, with the parts of the grid
-//! that all fields share beside it: the plan and the exchange between ranks.
+//! A field is acted on as it is: phases of a step take it, or its number in the grid, with the parts of the
+//! grid that all fields share beside it: the plan and the exchange between ranks.
 use partition::comm::{Comm, Pending};
 use rayon::prelude::*;
 
@@ -17,8 +17,8 @@ use crate::solver::sorting::bins::BinLists;
 use crate::solver::sorting::box_widths::{BinMissing, BoxWidths};
 use crate::solver::state::phases::{Phase, Phases};
 
-/// A velocity field: arenas and node fields of its particles, and which of these are in which bin. The default
-/// has no memory.
+/// A velocity field: arenas and node fields of its particles, and which of these are in which bin. The
+/// default has no memory.
 #[derive(Default)]
 pub(in crate::solver) struct VelocityField<const D: usize> {
     pub(in crate::solver) arenas: Arenas<D>,

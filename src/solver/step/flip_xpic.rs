@@ -38,8 +38,8 @@ fn with_velocities<const D: usize>(mut given: Vec<GivenColumn>, velocities: &[[f
 }
 
 impl<const D: usize> Solver<D> {
-    /// Before P2G: velocities of the nodes of a velocity field without the impulse of stress, for transfers and
-    /// for loads that need them. Masses may be given in place of those of the particles.
+    /// Before P2G: velocities of the nodes of a velocity field without the impulse of stress, for transfers
+    /// and for loads that need them. Masses may be given in place of those of the particles.
     pub(super) fn note_velocities(&mut self, field: usize, given: &[Vec<GivenColumn>]) {
         let time = self.clock.time;
         let absorbs = self.physics.absorbing.as_flattened().iter().any(Option::is_some);

@@ -111,7 +111,8 @@ impl<const D: usize> Solver<D> {
         }
     }
 
-    /// Not collective. Interpolates the rows of constrained nodes of a velocity field from those of real nodes.
+    /// Not collective. Interpolates the rows of constrained nodes of a velocity field from those of real
+    /// nodes.
     pub(in crate::solver) fn prolong(&mut self, field: usize) {
         self.grid.fields[field].prolong(&self.grid.plan, &mut self.phases);
     }
@@ -215,8 +216,8 @@ impl<'a, const D: usize> Faces<'a, D> {
     }
 }
 
-/// Applies the conditions of the domain's faces to the rows of the real nodes on them in active blocks, axis by
-/// axis. `note` receives face, node and the impulse of the node on the face, kg m/s.
+/// Applies the conditions of the domain's faces to the rows of the real nodes on them in active blocks, axis
+/// by axis. `note` receives face, node and the impulse of the node on the face, kg m/s.
 pub fn apply_faces<const D: usize>(
     (rows, active): (&mut [Row], &[bool]),
     plan: &GridPlan<D>,

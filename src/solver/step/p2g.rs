@@ -93,8 +93,8 @@ impl<const D: usize> Solver<D> {
     }
 }
 
-/// Scatters mass, affine momentum and the impulse of stress of the members of a bin into its arena. Leaf by leaf,
-/// columns may be given in place of those of the particles.
+/// Scatters mass, affine momentum and the impulse of stress of the members of a bin into its arena. Leaf by
+/// leaf, columns may be given in place of those of the particles.
 pub(in crate::solver) fn scatter<const D: usize>(
     scratch: &mut p2g::Scratch<D>,
     bin: &BinView<'_, D>,

@@ -92,9 +92,9 @@ impl<const D: usize> Solver<D> {
     }
 
     /// Collective over neighbours. Ties the surface nodes of the velocity field numbered `field`, whose rows
-    /// hold velocities, if it has ties. Free of ties stay nodes that other conditions move and nodes beside what
-    /// the material may touch, where ties would keep it from giving way: nodes on faces of the domain, in grips,
-    /// within a cell of colliders, and those of other fields, whose nodes with mass are `occupied`.
+    /// hold velocities, if it has ties. Free of ties stay nodes that other conditions move and nodes beside
+    /// what the material may touch, where ties would keep it from giving way: nodes on faces of the domain,
+    /// in grips, within a cell of colliders, and those of other fields, whose nodes with mass are `occupied`.
     pub(super) fn tie_surface(&mut self, field: usize, occupied: &[Vec<u64>]) {
         if !self.physics.has_ties(field) {
             return;

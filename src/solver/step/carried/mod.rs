@@ -6,12 +6,12 @@
 //! velocity `v + Δt f / m` in place of the particle's own: the force passes through parts of boxes and
 //! constrained nodes like momentum, and no kernel handles loads.
 //!
-//! A force on a surface acts at the surface, with the moment `M = f ⊗ d` by its way d from the centre of the
-//! particle: to first order nodes get `Δt (w f + M ∇w)`, so that uniform stress balances a uniform load to
-//! round-off where boxes tile cells. At the centres it would leave half of the load in the outermost row. The
-//! second term is that of a stress `−M / V₀`, which P2G is given with that of the particle: of M the symmetric
-//! part, and all of it in load steps. The work is `f · Δx + Δt M : ∇v` with the displacement Δx of the particle, which
-//! `follow` finds.
+//! A force on a surface acts at the surface, with the moment `M = f ⊗ d` by its way d from the centre of
+//! the particle: to first order nodes get `Δt (w f + M ∇w)`, so that uniform stress balances a uniform
+//! load to round-off where boxes tile cells. At the centres it would leave half of the load in the outermost
+//! row. The second term is that of a stress `−M / V₀`, which P2G is given with that of the particle: of M
+//! the symmetric part, and all of it in load steps. The work is `f · Δx + Δt M : ∇v` with the
+//! displacement Δx of the particle, which `follow` finds.
 pub(super) mod follow;
 
 use rayon::prelude::*;
@@ -54,7 +54,8 @@ fn surface_at<const D: usize>(
     std::array::from_fn(|a| x[a] + way[a])
 }
 
-/// Columns of a leaf from `first` on, as many as `count`, to be given with changed values in place of its own.
+/// Columns of a leaf from `first` on, as many as `count`, to be given with changed values in place of its
+/// own.
 fn columns<const D: usize>(chunk: &Chunk<D>, first: usize, count: usize) -> Vec<GivenColumn> {
     let values = |column: usize| chunk.column(column).iter().copied().collect();
     (first..first + count).map(|column| GivenColumn { column, values: values(column) }).collect()
@@ -97,8 +98,8 @@ struct Pushing<'a, const D: usize> {
 
 impl<const D: usize> Pushing<'_, D> {
     /// Adds the forces on the particles of a leaf with cells of this edge (m), which move with `scale` times
-    /// their mass, to `pushes`. Returns their velocities after the impulses and, where forces act at surfaces,
-    /// their stress with that of the moments; nothing where no force acts.
+    /// their mass, to `pushes`. Returns their velocities after the impulses and, where forces act at
+    /// surfaces, their stress with that of the moments; nothing where no force acts.
     fn push(
         &self,
         chunk: &Chunk<D>,
@@ -141,8 +142,8 @@ impl<const D: usize> Pushing<'_, D> {
         velocities
     }
 
-    /// Adds `−M / V₀` with the moments M of some forces to the stress of a particle, in columns that are those
-    /// of the leaf at first.
+    /// Adds `−M / V₀` with the moments M of some forces to the stress of a particle, in columns that are
+    /// those of the leaf at first.
     fn add_moments(
         &self,
         chunk: &Chunk<D>,
@@ -222,8 +223,8 @@ fn displacement<const D: usize>(chunk: &Chunk<D>, first: Option<usize>, p: usize
 }
 
 impl<const D: usize> Solver<D> {
-    /// Not collective. Adds the columns with which particles scatter the impulse of the forces on them, leaf by
-    /// leaf; none if no force acts.
+    /// Not collective. Adds the columns with which particles scatter the impulse of the forces on them, leaf
+    /// by leaf; none if no force acts.
     pub(in crate::solver) fn push_particles(&mut self, lengths: Lengths, given: &mut Vec<Vec<GivenColumn>>) {
         let (physics, time) = (&self.physics, self.clock.time);
         let scaled = physics.has_scaled_masses();
@@ -268,8 +269,8 @@ impl<const D: usize> Solver<D> {
         });
     }
 
-    /// Not collective. Masses with which particles move, leaf by leaf, in stages with mass scaling; nothing in
-    /// others, where these are their own.
+    /// Not collective. Masses with which particles move, leaf by leaf, in stages with mass scaling; nothing
+    /// in others, where these are their own.
     pub(super) fn scaled_masses(&self) -> Vec<Vec<GivenColumn>> {
         let (physics, plan) = (&self.physics, &self.grid.plan);
         if !physics.has_scaled_masses() {

@@ -156,8 +156,9 @@ impl<const D: usize> Solver<D> {
         self.has_moving_walls() || leaves.any(|(chunk, near)| *near && !chunk.is_empty())
     }
 
-    /// Collective over neighbours. Holds the material of the velocity field numbered `field` to the conditions of
-    /// colliders at feet, with those of nodes and faces. Adds impulse and angular impulse on each collider.
+    /// Collective over neighbours. Holds the material of the velocity field numbered `field` to the
+    /// conditions of colliders at feet, with those of nodes and faces. Adds impulse and angular impulse on
+    /// each collider.
     pub(super) fn hold_at_feet(&mut self, field: usize, rates: &[Rate<D>], sums: &mut [[ExactSum; SUMS]]) {
         let Some(lengths) = self.grid.walls.known_over.filter(|_| self.has_feet(field)) else { return };
         let physics = &self.physics;
