@@ -329,14 +329,6 @@ fn each_floor_exists() {
 /// Most source files of a folder; files in its folders count there.
 const MOST_FILES: usize = 12;
 
-/// Folders with more, each with its reason.
-const LARGE: [&str; 2] = [
-    // To be split.
-    "src/solver/step",
-    // To be split.
-    "src/solver/state",
-];
-
 #[test]
 fn folders_have_at_most_twelve_files() {
     let mut counts: BTreeMap<String, usize> = BTreeMap::new();
@@ -352,11 +344,7 @@ fn folders_have_at_most_twelve_files() {
     }
     assert!(counts.contains_key("src/job/convert") && counts.contains_key("cli"), "{counts:?}");
     for (folder, count) in &counts {
-        let is_large = *count > MOST_FILES;
-        match LARGE.contains(&folder.as_str()) {
-            true => assert!(is_large, "{folder} has {count} files: remove it from the list"),
-            false => assert!(!is_large, "{folder} has {count} files: group what belongs together"),
-        }
+        assert!(*count <= MOST_FILES, "{folder} has {count} files: group what belongs together");
     }
 }
 

@@ -43,7 +43,7 @@ use crate::particle::Chunk;
 use crate::solver::state::bookings::Contacts;
 use crate::solver::state::cost::Costs;
 use crate::solver::state::grid::Grid;
-use crate::solver::state::inside::KnownInside;
+use crate::solver::state::grid::inside::KnownInside;
 use crate::solver::state::last_partition::LastPartition;
 use crate::solver::state::leaf_data::LeafData;
 use crate::solver::state::parts::{Adaptation, Balance, EquilibriumState, Measured, ParticleForces, Sums};

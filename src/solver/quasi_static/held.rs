@@ -1,6 +1,6 @@
 //! Supports of a node in a load step: faces, grips and colliders along axes, and walls along which it slides
 //! or which it may leave.
-use crate::solver::state::inside::dot;
+use crate::solver::state::grid::inside::dot;
 
 /// Source of a prescribed displacement.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -35,7 +35,7 @@ use crate::load::{Kind, Load};
 use crate::particle::chunk::{Chunk, Layout};
 use crate::solver::migration::migrate::Moved;
 use crate::solver::state::bookings::SUMS;
-use crate::solver::state::inside::dot;
+use crate::solver::state::grid::inside::dot;
 use crate::solver::state::{Effort, Solver, StepError};
 use crate::solver::step::relax::stop;
 

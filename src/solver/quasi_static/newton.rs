@@ -11,9 +11,9 @@ use super::unknowns::{Nodal, Unknowns};
 use super::walls::Springs;
 use crate::kernel::{GivenColumn, Row, Scheme};
 use crate::solver::state::grid::Grid;
-use crate::solver::state::inside::dot;
+use crate::solver::state::grid::inside::dot;
 use crate::solver::state::{Effort, Solver};
-use crate::solver::step::p2g::scatter;
+use crate::solver::step::transfer::p2g::scatter;
 
 /// Most Newton iterations of a step.
 const ITERATIONS: u32 = 25;

@@ -22,10 +22,10 @@ use crate::particle::Chunk;
 use crate::particle::chunk::{Layout, TILE, Tag};
 use crate::simd::{LANES, Lanes, Vector, VectorMask};
 use crate::solver::state::Solver;
+use crate::solver::state::grid::velocity_field::VelocityField;
 use crate::solver::state::phases::Phase;
-use crate::solver::state::velocity_field::VelocityField;
-use crate::solver::step::look::Look;
-use crate::solver::step::mean_dilation::MeanDilation;
+use crate::solver::step::transfer::interpolate::Look;
+use crate::solver::step::transfer::mean_dilation::MeanDilation;
 
 /// A matrix of each particle of a batch.
 pub(super) type Matrix = [[Lanes; 3]; 3];

@@ -19,7 +19,7 @@ use crate::quantity::in_job;
 use crate::solver::physics::Physics;
 use crate::solver::state::Solver;
 use crate::solver::state::grid::Grid;
-use crate::solver::state::inside::{Asked, Inside, dot};
+use crate::solver::state::grid::inside::{Asked, Inside, dot};
 use rayon::prelude::*;
 use rustc_hash::FxHashMap;
 

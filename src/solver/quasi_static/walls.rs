@@ -16,7 +16,7 @@ use partition::comm::Comm;
 
 use super::held::{Along, Held, Holder, State, Wall, axis, without};
 use super::unknowns::{Nodal, Unknowns};
-use crate::solver::state::inside::dot;
+use crate::solver::state::grid::inside::dot;
 
 /// Displacement, in cells, below which a node is where it should be.
 const SAME: f64 = 1e-9;

@@ -9,7 +9,7 @@ use crate::grid::sums::node_fields::load_rows;
 use crate::grid::{GridPlan, NodeFields, Window};
 use crate::kernel::{Row, arena_nodes};
 use crate::particle::Chunk;
-use crate::solver::state::velocity_field::NodeExchange;
+use crate::solver::state::grid::velocity_field::NodeExchange;
 
 /// Node fields for the ground: one for sums, one for values.
 pub(super) struct Nodes<'a, const D: usize> {

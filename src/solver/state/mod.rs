@@ -3,13 +3,9 @@
 //! | file | what it holds |
 //! |---|---|
 //! | [`parts`] | sums, forces on particles, measures, equilibrium, adaptation, balance |
-//! | [`grid`] | plan, velocity fields and exchanges of one tree and partition |
-//! | `velocity_field` | what particles scatter into and gather from |
-//! | `inside` | nodes inside colliders, and the surfaces that they are behind |
-//! | `walls` | nodes near surfaces that hold material back |
+//! | [`grid`] | plan, velocity fields and exchanges of one tree and partition; nodes at surfaces |
 //! | [`bookings`] | states and reactions of colliders; impulse and work of loads |
 //! | [`leaf_data`] | data of each own leaf beside its particles |
-//! | `node_fill` | how full nodes are |
 //! | `regrid_cache` | data kept from one regrid to the next |
 //! | [`cost`], `last_partition` | measured cost of leaves, and of the partition |
 //! | [`relaxation`] | the way to equilibrium |
@@ -34,17 +30,13 @@ use crate::solver::state::phases::Phases;
 pub mod bookings;
 pub mod cost;
 pub mod grid;
-pub(super) mod inside;
 pub(super) mod last_partition;
 pub mod leaf_data;
-pub(super) mod node_fill;
 pub mod parts;
 pub mod phases;
 pub(super) mod regrid_cache;
 pub mod regrid_timers;
 pub mod relaxation;
-pub(super) mod velocity_field;
-pub(super) mod walls;
 
 /// Why a step failed on this rank.
 #[derive(Debug, thiserror::Error)]

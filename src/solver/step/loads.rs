@@ -9,8 +9,8 @@ use crate::load::Load;
 use crate::solver::state::Solver;
 use crate::solver::state::bookings::ForceAndWork;
 use crate::solver::state::grid::Grid;
+use crate::solver::state::grid::velocity_field::VelocityField;
 use crate::solver::state::phases::Phase;
-use crate::solver::state::velocity_field::VelocityField;
 
 /// Impulse of a load on one node in one step.
 pub(in crate::solver) struct Push<const D: usize> {

@@ -3,14 +3,10 @@
 //! | file | what it holds |
 //! |---|---|
 //! | [`time_step`] | the bound on the step |
-//! | [`p2g`] | particles to nodes, over all bins |
+//! | [`transfer`] | particles to nodes and back; increments of FLIP and XPIC; F-bar |
 //! | [`node_update`] | velocities of nodes; conditions on faces |
-//! | [`g2p`] | nodes to particles, over all leaves |
-//! | `look` | gather for the particles of a leaf, without an advance |
-//! | `mean_dilation` | F-bar: dilation as the mean over cells |
 //! | `fill` | fluids keep their volume |
 //! | `exchange` | sums and particles between ranks |
-//! | `flip_xpic` | velocities that FLIP and XPIC need |
 //! | [`colliders`] | colliders: reactions and motion |
 //! | `surfaces` | volumes and their gradients at nodes near surfaces |
 //! | `walls` | gaps at faces and colliders; conditions of colliders on nodes |
@@ -30,17 +26,13 @@ mod contact;
 pub mod exchange;
 mod failed;
 mod fill;
-mod flip_xpic;
-pub mod g2p;
 pub mod loads;
-pub(in crate::solver) mod look;
-pub(in crate::solver) mod mean_dilation;
 pub mod node_update;
-pub mod p2g;
 pub mod relax;
 mod saturation;
 mod sources;
 mod surfaces;
 mod ties;
 pub mod time_step;
+pub mod transfer;
 mod walls;

@@ -14,10 +14,10 @@ use crate::solver::physics::Physics;
 use crate::solver::sorting::box_widths::BinMissing;
 use crate::solver::state::Solver;
 use crate::solver::state::bookings::SUMS;
+use crate::solver::state::grid::velocity_field::VelocityField;
+use crate::solver::state::grid::walls::Walls;
 use crate::solver::state::grid::{Grid, Solids};
 use crate::solver::state::phases::Phase;
-use crate::solver::state::velocity_field::VelocityField;
-use crate::solver::state::walls::Walls;
 
 impl<const D: usize> Solver<D> {
     /// Collective over neighbours. `v_j = p_j / m_j + Δt g` on real nodes with the kick Δt, then loads, ties

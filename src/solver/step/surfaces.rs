@@ -16,9 +16,9 @@ use crate::particle::group::Group;
 use crate::particle::volume::{box_volume, volume_ratios};
 use crate::solver::sorting::box_widths::BinMissing;
 use crate::solver::state::Solver;
+use crate::solver::state::grid::velocity_field::VelocityField;
 use crate::solver::state::grid::{Grid, Solids};
-use crate::solver::state::velocity_field::VelocityField;
-use crate::solver::step::p2g::scatter;
+use crate::solver::step::transfer::p2g::scatter;
 
 /// Share of a length by which boxes that must hold something are larger.
 const MARGIN: f64 = 1e-9;

@@ -15,7 +15,7 @@ use crate::particle::group::{Group, Share};
 use crate::particle::volume::{box_volume, volume_ratios};
 use crate::solver::state::Solver;
 use crate::solver::state::grid::Grid;
-use crate::solver::state::inside::{SAME, is_still};
+use crate::solver::state::grid::inside::{SAME, is_still};
 use crate::solver::state::phases::Phase;
 
 /// Share of its volume from which a cell is well filled. A little less than one half, so that cells that are

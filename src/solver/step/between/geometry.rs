@@ -6,7 +6,7 @@ use crate::grid::{NodeFields, Window};
 use crate::kernel::{ARENA_EDGE, BLOCK, Row};
 use crate::solver::state::Solver;
 use crate::solver::state::grid::Grid;
-use crate::solver::state::velocity_field::VelocityField;
+use crate::solver::state::grid::velocity_field::VelocityField;
 
 impl<const D: usize> Grid<D> {
     /// Real nodes of each block at which two velocity fields have mass.

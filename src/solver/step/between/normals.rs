@@ -19,9 +19,9 @@ use crate::grid::{GridPlan, Window};
 use crate::kernel::{ARENA_EDGE, BLOCK, Row, arena_nodes};
 use crate::solver::state::Solver;
 use crate::solver::state::grid::Grid;
+use crate::solver::state::grid::velocity_field::VelocityField;
+use crate::solver::state::grid::walls::with_children;
 use crate::solver::state::phases::Phase;
-use crate::solver::state::velocity_field::VelocityField;
-use crate::solver::state::walls::with_children;
 
 /// Smoothed `Σ V ∇w` at the nodes where bodies meet.
 pub(super) struct Smoothed<const D: usize> {

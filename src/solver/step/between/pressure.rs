@@ -5,10 +5,10 @@ use super::press::NormalForce;
 use crate::grid::GridPlan;
 use crate::kernel::{Row, Scheme};
 use crate::solver::state::Solver;
+use crate::solver::state::grid::velocity_field::VelocityField;
 use crate::solver::state::grid::{Grid, Solids};
 use crate::solver::state::phases::{Phase, Phases};
-use crate::solver::state::velocity_field::VelocityField;
-use crate::solver::step::g2p::interpolate;
+use crate::solver::step::transfer::g2p::interpolate;
 
 /// Weight of the last step in the mean that particles carry.
 const LAST: f64 = 0.05;

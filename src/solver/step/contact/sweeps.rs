@@ -13,10 +13,10 @@ use crate::particle::chunk::Layout;
 use crate::solver::sorting::bin_view::BinView;
 use crate::solver::state::Solver;
 use crate::solver::state::grid::Grid;
+use crate::solver::state::grid::velocity_field::VelocityField;
 use crate::solver::state::phases::Phase;
-use crate::solver::state::velocity_field::VelocityField;
-use crate::solver::step::look::Look;
-use crate::solver::step::p2g::{scatter, spreads};
+use crate::solver::step::transfer::interpolate::Look;
+use crate::solver::step::transfer::p2g::{scatter, spreads};
 
 /// Second moments D of the weights, m², of the particles in contact, leaf by leaf.
 type Spreads<const D: usize> = Vec<Vec<[f64; D]>>;

@@ -11,7 +11,7 @@ use crate::particle::chunk::{Chunk, Layout, Tag};
 use crate::particle::volume::{reference_volume, volume};
 use crate::solver::state::Solver;
 use crate::solver::state::grid::Grid;
-use crate::solver::state::node_fill::NodeFill;
+use crate::solver::state::grid::node_fill::NodeFill;
 use crate::solver::state::phases::Phase;
 
 impl<const D: usize> Solver<D> {

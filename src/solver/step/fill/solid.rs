@@ -3,8 +3,8 @@ use crate::boundary::{Collider, ColliderState};
 use crate::grid::GridPlan;
 use crate::grid::mask::{bits, block_nodes};
 use crate::grid::plan::Block;
-use crate::solver::state::inside::is_still;
-use crate::solver::state::node_fill::OpenShares;
+use crate::solver::state::grid::inside::is_still;
+use crate::solver::state::grid::node_fill::OpenShares;
 
 /// Refers the fill of the real nodes of a block to the space that colliders leave open at them. `still` has
 /// the known open shares of colliders that never move.

@@ -14,7 +14,7 @@ use crate::kernel::{Coordinates, Row};
 use crate::solver::state::Solver;
 use crate::solver::state::bookings::SUMS;
 use crate::solver::state::grid::Grid;
-use crate::solver::state::inside::{Inside, Plane, SAME};
+use crate::solver::state::grid::inside::{Inside, Plane, SAME};
 use crate::solver::state::phases::Phase;
 use crate::solver::step::colliders::Touch;
 

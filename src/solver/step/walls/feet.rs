@@ -6,7 +6,7 @@ use crate::grid::mask::{block_nodes, node_of_bit, offset, offset_count, offset_i
 use crate::grid::plan::{NO_BLOCK, arena_index};
 use crate::kernel::{ARENA_EDGE, BLOCK, Coordinates, Row};
 use crate::leapfrog::Lengths;
-use crate::solver::state::inside::{Inside, Plane, SAME};
+use crate::solver::state::grid::inside::{Inside, Plane, SAME};
 
 /// Corners of a cell, at most.
 const CORNERS: usize = 8;

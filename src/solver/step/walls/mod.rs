@@ -42,9 +42,9 @@ use crate::solver::sorting::box_widths::BinMissing;
 use crate::solver::state::Solver;
 use crate::solver::state::bookings::SUMS;
 use crate::solver::state::grid::Grid;
-use crate::solver::state::inside::{Asked, Inside, is_still};
+use crate::solver::state::grid::inside::{Asked, Inside, is_still};
+use crate::solver::state::grid::walls::{StillWalls, with_children};
 use crate::solver::state::phases::Phase;
-use crate::solver::state::walls::{StillWalls, with_children};
 use crate::solver::step::colliders::Touch;
 
 /// Sweeps over the feet in a step.

@@ -14,8 +14,8 @@ use crate::leapfrog::Lengths;
 use crate::solver::state::Solver;
 use crate::solver::state::bookings::SUMS;
 use crate::solver::state::grid::Grid;
-use crate::solver::state::inside::{Inside, Plane};
-use crate::solver::state::velocity_field::VelocityField;
+use crate::solver::state::grid::inside::{Inside, Plane};
+use crate::solver::state::grid::velocity_field::VelocityField;
 use crate::solver::step::colliders::Touch;
 use crate::solver::step::contact::sweeps::for_real_nodes;
 

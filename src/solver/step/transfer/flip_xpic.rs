@@ -10,14 +10,14 @@
 //! one more exchange, so FLIP needs one and XPIC(m) needs m beside the usual one; APIC and TPIC need none.
 use rayon::prelude::*;
 
-use super::node_update::{Faces, apply_faces, update_velocity};
 use crate::kernel::{GivenColumn, Row, Transfer};
 use crate::memory::Block;
 use crate::particle::chunk::Layout;
 use crate::solver::state::Solver;
 use crate::solver::state::grid::Grid;
+use crate::solver::state::grid::velocity_field::{Increments, VelocityField};
 use crate::solver::state::phases::Phase;
-use crate::solver::state::velocity_field::{Increments, VelocityField};
+use crate::solver::step::node_update::{Faces, apply_faces, update_velocity};
 
 /// `to -= from`.
 fn subtract(to: &mut [Row], from: &[Row]) {
@@ -40,7 +40,7 @@ fn with_velocities<const D: usize>(mut given: Vec<GivenColumn>, velocities: &[[f
 impl<const D: usize> Solver<D> {
     /// Before P2G: velocities of the nodes of a velocity field without the impulse of stress, for transfers
     /// and for loads that need them. Masses may be given in place of those of the particles.
-    pub(super) fn note_velocities(&mut self, field: usize, given: &[Vec<GivenColumn>]) {
+    pub(in crate::solver::step) fn note_velocities(&mut self, field: usize, given: &[Vec<GivenColumn>]) {
         let time = self.clock.time;
         let absorbs = self.physics.absorbing.as_flattened().iter().any(Option::is_some);
         let damps = self.physics.loads.iter().any(|load| load.needs_start() && load.is_active(time));

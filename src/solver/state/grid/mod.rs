@@ -1,4 +1,17 @@
 //! The grid of one tree and one partition: plan, velocity fields and exchanges.
+//!
+//! | file | what it holds |
+//! |---|---|
+//! | this | plan, velocity fields and exchanges |
+//! | `velocity_field` | arenas, node fields and lists of the particles of a group of bodies |
+//! | `inside` | nodes inside colliders, and the surfaces that they are behind |
+//! | `walls` | nodes near surfaces that hold material back |
+//! | `node_fill` | how full nodes are |
+pub(in crate::solver) mod inside;
+pub(in crate::solver) mod node_fill;
+pub(in crate::solver) mod velocity_field;
+pub(in crate::solver) mod walls;
+
 use partition::Forest;
 use partition::comm::{Comm, Traffic};
 
@@ -11,10 +24,10 @@ use crate::particle::Chunk;
 use crate::solver::migration::crossings::FaceRules;
 use crate::solver::migration::migrate::Migration;
 use crate::solver::physics::Physics;
-use crate::solver::state::inside::InsideStill;
-use crate::solver::state::node_fill::NodeFill;
-use crate::solver::state::velocity_field::{NodeExchange, VelocityField};
-use crate::solver::state::walls::Walls;
+use crate::solver::state::grid::inside::InsideStill;
+use crate::solver::state::grid::node_fill::NodeFill;
+use crate::solver::state::grid::velocity_field::{NodeExchange, VelocityField};
+use crate::solver::state::grid::walls::Walls;
 
 /// Plan, velocity fields and exchanges.
 pub struct Grid<const D: usize> {

@@ -49,7 +49,12 @@ impl<const D: usize> Solver<D> {
     }
 
     /// As [`Solver::nodes_from_particles`] in one velocity field.
-    pub(super) fn field_from_particles(&mut self, field: usize, dt: f64, given: &[Vec<GivenColumn>]) {
+    pub(in crate::solver::step) fn field_from_particles(
+        &mut self,
+        field: usize,
+        dt: f64,
+        given: &[Vec<GivenColumn>],
+    ) {
         let (chunks, times, scheme) = (&self.chunks, &self.leaf_data.times, self.physics.scheme());
         let Grid { plan, fields, exchange, .. } = &mut self.grid;
         fields[field].scatter_and_sum((plan, exchange), &mut self.phases, chunks, |scratch, bin, arena| {
@@ -119,7 +124,7 @@ pub(in crate::solver) fn scatter<const D: usize>(
 
 /// Second moments D of the weights, m², of the particles of a leaf that are sorted into these bins; 1 for
 /// others.
-pub(super) fn spreads<'a, const D: usize>(
+pub(in crate::solver::step) fn spreads<'a, const D: usize>(
     bins: impl Iterator<Item = BinView<'a, D>>,
     chunk: &Chunk<D>,
     scheme: &Scheme,

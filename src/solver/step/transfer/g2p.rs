@@ -31,9 +31,9 @@ use crate::solver::sorting::leaf_bins::{self, LeafBins};
 use crate::solver::state::Solver;
 use crate::solver::state::bookings::{FAILED_SUMS, Near, ParticlePush, SourcePush, Struck};
 use crate::solver::state::grid::Grid;
+use crate::solver::state::grid::velocity_field::VelocityField;
 use crate::solver::state::leaf_data::LeafData;
 use crate::solver::state::phases::Phase;
-use crate::solver::state::velocity_field::VelocityField;
 use crate::solver::step::carried::follow::{
     add_ways, follow_areas, follow_strain, note_turns, note_ways, positions,
 };
@@ -41,9 +41,9 @@ use crate::solver::step::carried::has_surfaces;
 use crate::solver::step::contact::guard::Guard;
 use crate::solver::step::failed::{Failures, Found};
 use crate::solver::step::fill::means::MeanVolumes;
-use crate::solver::step::look::Look;
-use crate::solver::step::mean_dilation::MeanDilation;
 use crate::solver::step::sources::{Conveyed, Conveyors, conveyors};
+use crate::solver::step::transfer::interpolate::Look;
+use crate::solver::step::transfer::mean_dilation::MeanDilation;
 use crate::solver::step::walls::passing::Barrier;
 
 /// Memory that a thread reuses from leaf to leaf.
@@ -260,7 +260,7 @@ impl<const D: usize> Solver<D> {
     }
 
     /// S: velocities of the nodes of a velocity field at its particles, leaf by leaf; 0 for those of others.
-    pub(super) fn interpolate(&mut self, field: usize) -> Vec<Vec<[f64; D]>> {
+    pub(in crate::solver::step) fn interpolate(&mut self, field: usize) -> Vec<Vec<[f64; D]>> {
         let Grid { plan, fields, .. } = &self.grid;
         let VelocityField { nodes, lists, .. } = &fields[field];
         let scheme = self.physics.scheme();
@@ -269,7 +269,7 @@ impl<const D: usize> Solver<D> {
 }
 
 /// Values of nodes, given by their rows, at the particles in lists, leaf by leaf; 0 for others.
-pub(super) fn interpolate<const D: usize>(
+pub(in crate::solver::step) fn interpolate<const D: usize>(
     plan: &GridPlan<D>,
     (lists, rows): (&BinLists<D>, &[Row]),
     chunks: &[Chunk<D>],
