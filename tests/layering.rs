@@ -348,6 +348,29 @@ fn folders_have_at_most_twelve_files() {
     }
 }
 
+/// Comments fit into 110 columns, tables aside, and say what a thing is: none begins with "What".
+#[test]
+fn comments_have_their_form() {
+    let mut faults = Vec::new();
+    for package in ["src", "post/src", "cli", "partition/src"] {
+        let mut sources = Sources::new();
+        read_sources(&Path::new(env!("CARGO_MANIFEST_DIR")).join(package), "", &mut sources);
+        for (file, text) in &sources {
+            for (number, line) in (1..).zip(text.lines()) {
+                let comment = line.trim_start();
+                let Some(words) = ["/// ", "//! "].iter().find_map(|mark| comment.strip_prefix(mark)) else {
+                    continue;
+                };
+                let is_wide = line.chars().count() > 110 && !words.starts_with('|');
+                if is_wide || words.starts_with("What ") && comment.ends_with('.') {
+                    faults.push(format!("{package}/{file}:{number}: {comment}"));
+                }
+            }
+        }
+    }
+    assert!(faults.is_empty(), "{}", faults.join("\n"));
+}
+
 /// The checks above see what they are there for.
 #[test]
 fn an_upward_import_is_found() {

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
+
+from ._header import text
 
 
 class Field(NamedTuple):
@@ -13,41 +15,11 @@ class Field(NamedTuple):
     description: str
 
 
-KNOWN: dict[str, Field] = {
-    "position": Field("m", "position"),
-    "velocity": Field("m/s", "velocity"),
-    "speed": Field("m/s", "magnitude of the velocity"),
-    "id": Field("", "identifier of the particle"),
-    "material": Field("", "material"),
-    "body": Field("", "body"),
-    "strain": Field("", "total logarithmic strain since the particle came"),
-    "equivalent_strain": Field("", "equivalent total strain"),
-    "displacement": Field("m", "displacement since the particle came"),
-    "particle_level": Field("", "tree level that the particle was made for"),
-    "leaf_level": Field("", "level of the leaf that holds the particle"),
-    "plastic_strain": Field("", "first history variable of the material, as a rule the accumulated plastic strain"),
-    "damage": Field("", "stiffness that cracks have taken; of metals plastic strain over failure strain"),
-    "pressure": Field("Pa", "mean Cauchy stress with the sign changed; positive in compression"),
-    "von_mises": Field("Pa", "von Mises equivalent of the Cauchy stress"),
-    "stress": Field("Pa", "Cauchy stress"),
-    "mass": Field("kg", "mass; per metre of thickness in plane strain"),
-    "density": Field("kg/m³", "density"),
-    "volume_ratio": Field("", "volume over reference volume, det F"),
-    "pore_pressure": Field("Pa", "pressure of the water in the pores"),
-    "head": Field("m", "head of the water in the pores"),
-    "total_pressure": Field("Pa", "pressure of ground and water together"),
-    "total_stress": Field("Pa", "stress of ground and water together"),
-    "excess_pore_pressure": Field("Pa", "excess pore pressure of undrained material"),
-    "effective_pressure": Field("Pa", "pressure less the excess pore pressure"),
-    "effective_stress": Field("Pa", "Cauchy stress without the excess pore pressure"),
-    "contact_pressure": Field("Pa", "pressure of contact with other bodies"),
-    "half_width": Field("m", "half of the undeformed edge of the particle's box"),
-    "plastic_work": Field("J/m³", "plastic work done so far, per reference volume"),
-    "level": Field("", "level of the leaf"),
-    "particles": Field("", "particles in the leaf"),
-    "edge": Field("m", "edge of the leaf"),
-}
-"""Fields of files that do not describe themselves. Descriptions in a file come first."""
+def describe(name: str, dataset: Any) -> Field:
+    """Unit and description of a data set, as its file has them; else its name in words."""
+    words = name.replace("_", " ")
+    return Field(text(dataset.attrs.get("units", "")), text(dataset.attrs.get("description", words)))
+
 
 AXES = ("x", "y", "z")
 SYMMETRIC = ("xx", "yy", "zz", "xy", "yz", "xz")

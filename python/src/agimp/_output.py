@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from . import _fields, _frames, _meshes, _paths, _revolve
 from ._errors import FileRefused
-from ._header import checksums, Header, opened, read_header, text
+from ._header import checksums, Header, opened, read_header
 from ._tree import Tree
 
 if TYPE_CHECKING:
@@ -40,7 +40,7 @@ class Output:
             sets = {name: f"{_POINTS}/{name}" for name in file[_POINTS]}
             sets |= {name: f"{_STATE}/{name}" for name in _OF_STATE if f"{_STATE}/{name}" in file and name not in sets}
             self._sets = sets
-            self._info = {name: _describe(name, file[path]) for name, path in sets.items()}
+            self._info = {name: _fields.describe(name, file[path]) for name, path in sets.items()}
 
     def __repr__(self) -> str:
         return f"Output({str(self.path)!r}): t = {self.time:g} s, step {self.step}, {len(self)} particles"
@@ -205,10 +205,3 @@ class Output:
 def read(path: str | PathLike[str]) -> Output:
     """Opens one output or checkpoint file."""
     return Output(path)
-
-
-def _describe(name: str, dataset: Any) -> _fields.Field:
-    known = _fields.KNOWN.get(name, _fields.Field("", name.replace("_", " ")))
-    return _fields.Field(
-        text(dataset.attrs.get("units", known.unit)), text(dataset.attrs.get("description", known.description))
-    )

@@ -33,6 +33,8 @@ class Tree:
     """Edges, m."""
     fields: dict[str, NDArray[Any]]
     """Values of each leaf: `level`, `particles` and what else the run has."""
+    described: dict[str, _fields.Field]
+    """Units and descriptions of these."""
 
     @classmethod
     def read(cls, path: Path) -> Tree:
@@ -42,10 +44,11 @@ class Tree:
             group = next((name for name in ("VTKHDF/CellData", "state/tree") if f"{name}/level" in file), None)
             if group is None:
                 raise FileRefused(f"{path}: holds no tree")
-            fields = {"level": np.asarray(file[group]["level"][()])}
             extra = group if group != "state/tree" else "state/leaf"
-            fields["particles"] = np.asarray(file[group]["particles"][()])
-            fields |= {name: np.asarray(values[()]) for name, values in file.get(extra, {}).items() if name not in fields}
+            sets = {name: file[group][name] for name in ("level", "particles")}
+            sets |= {name: values for name, values in file.get(extra, {}).items() if name not in sets}
+            fields = {name: np.asarray(values[()]) for name, values in sets.items()}
+            described = {name: _fields.describe(name, values) for name, values in sets.items()}
             edge = header.root_edge / np.exp2(fields["level"].astype(np.float64))
             if group == "state/tree":
                 lower = np.asarray(header.origin) + np.asarray(file[group]["coord"][()]) * edge[:, None]
@@ -54,7 +57,7 @@ class Tree:
                 lower = np.asarray(file["VTKHDF/Points"][()])[::corners, : header.dimension]
             if any(len(values) != header.leaves for values in (lower, edge, *fields.values())):
                 raise FileRefused(f"{path}: the file is damaged: data of leaves do not have the {header.leaves} rows of the header")
-        return cls(header, lower, edge, fields)
+        return cls(header, lower, edge, fields, described)
 
     def __len__(self) -> int:
         """Number of leaves."""
@@ -81,8 +84,7 @@ class Tree:
         for axis, values in zip(_fields.AXES, self.lower.T):
             columns.add(axis, values, "m", f"lower corner along {axis}")
         for name, array in {"edge": self.edge, **self.fields}.items():
-            known = _fields.KNOWN.get(name, _fields.Field("", name.replace("_", " ")))
-            columns.add(name, array, known.unit, known.description)
+            columns.add(name, array, *{"edge": _fields.Field("m", "edge of the leaf"), **self.described}[name])
         return columns.table(time=self.header.time, step=self.header.step)
 
     def mesh(self) -> pyvista.UnstructuredGrid:

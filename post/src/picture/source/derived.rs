@@ -72,9 +72,6 @@ const RULES: &[Rule] = rules! {
     "z" ["m"] 1 <- "VTKHDF/Points": |r, out| out.push(r[0][2]);
 };
 
-/// Fields that a file may show although this version of the program does not compute them.
-const EXTRA: [(&str, &str); 1] = [("displacement", "m")];
-
 /// A file whose particles are to be drawn.
 pub(in crate::picture) struct Source<'f> {
     file: &'f Reader,
@@ -134,7 +131,6 @@ impl<'f> Source<'f> {
     fn offered(&self) -> Vec<String> {
         let known =
             PointField::ALL.map(PointField::name).into_iter().chain(RULES.iter().map(|rule| rule.name));
-        let known = known.chain(EXTRA.map(|(name, _)| name));
         let mut names: Vec<String> = Vec::new();
         for name in known {
             let Some(components) = self.components(name) else { continue };
@@ -160,9 +156,8 @@ impl<'f> Source<'f> {
     fn unit(&self, name: &str) -> &'static str {
         let field = PointField::from_name(name).map(PointField::unit);
         let rule = || RULES.iter().find(|rule| rule.name == name).map(|rule| rule.unit);
-        let extra = || EXTRA.iter().find(|(known, _)| *known == name).map(|(_, unit)| *unit);
         let whole = || self.component(name).map(|(whole, _)| self.unit(whole));
-        field.or_else(rule).or_else(extra).or_else(whole).unwrap_or("")
+        field.or_else(rule).or_else(whole).unwrap_or("")
     }
 
     /// Numbers of each particle that the quantity has; `None` if the file does not offer it.
