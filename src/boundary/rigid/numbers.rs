@@ -17,7 +17,7 @@ impl<const D: usize> Collider<D> {
             saved.real(format!("collider_{index}_state_{i}"), number);
         }
         if saved.is_reading() {
-            *state = self.from_numbers(&numbers);
+            *state = self.state_of(&numbers);
         }
     }
 
@@ -36,7 +36,7 @@ impl<const D: usize> Collider<D> {
     }
 
     /// A state from its numbers.
-    fn from_numbers(&self, numbers: &[f64]) -> ColliderState<D> {
+    fn state_of(&self, numbers: &[f64]) -> ColliderState<D> {
         let translation = std::array::from_fn(|a| numbers[a]);
         let velocity = std::array::from_fn(|a| numbers[D + a]);
         let (angle, rate) = (numbers[2 * D], Rate::about_axis(velocity, numbers[2 * D + 1]));

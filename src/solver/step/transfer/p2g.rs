@@ -23,10 +23,13 @@ impl<const D: usize> Solver<D> {
         let widths = self.physics.widths(plan);
         let widths = (&widths, self.physics.coordinates);
         let on = (&*plan, &exchange.seam);
-        fields.iter_mut().enumerate().fold(Ok(()), |sorted, (field, of_field)| {
+        let mut sorted = Ok(());
+        for (field, of_field) in fields.iter_mut().enumerate() {
             let group = self.physics.group(field);
-            sorted.and(of_field.sort(on, &mut self.phases, &self.chunks, widths, group.as_ref()))
-        })
+            let done = of_field.sort(on, &mut self.phases, &self.chunks, widths, group.as_ref());
+            sorted = sorted.and(done);
+        }
+        sorted
     }
 
     /// Collective over neighbours. `m_j = Σ w m`, `p_j = Σ w (m (v + C (x_j - x)) + Δt f) - Δt Σ V₀ τ ∇w` on
