@@ -88,8 +88,12 @@ impl ExactSum {
         Some(sum)
     }
 
-    /// Collective. Replaces each sum by its total over all ranks, with one reduction for all of them.
+    /// Collective. Replaces each sum by its total over all ranks, with one reduction for all of them; without
+    /// sums there is none.
     pub fn sum_over_ranks(comm: &Comm, sums: &mut [Self]) {
+        if sums.is_empty() {
+            return;
+        }
         let mut words: Vec<i64> = sums.iter_mut().flat_map(|sum| sum.words().to_vec()).collect();
         comm.sum_i64(&mut words);
         for (sum, words) in sums.iter_mut().zip(words.chunks_exact(Self::WORDS)) {

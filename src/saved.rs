@@ -146,9 +146,7 @@ impl<'a> Saved<'a> {
         match &mut self.way {
             Way::To { scalars, comm } => {
                 let mut totals: Vec<ExactSum> = sums.map(|sum| sum.clone()).collect();
-                if !totals.is_empty() {
-                    ExactSum::sum_over_ranks(comm, &mut totals);
-                }
+                ExactSum::sum_over_ranks(comm, &mut totals);
                 let totals = totals.iter_mut().enumerate();
                 scalars.exact.extend(totals.map(|(i, sum)| (name(i), sum.words().to_vec())));
             }
@@ -167,7 +165,7 @@ impl<'a> Saved<'a> {
 
     /// Values that the file of a run without them may lack.
     pub fn if_there(&mut self, values: impl FnOnce(&mut Self)) {
-        let missing = self.missing.clone();
+        let missing = self.missing.take();
         values(self);
         self.missing = missing;
     }

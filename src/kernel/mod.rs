@@ -12,7 +12,7 @@
 //! | [`stencil`], `weights` | weights along one axis; their products |
 //! | [`domain`], [`spread`] | half widths of boxes; second moments of weights |
 //! | [`hanging`], [`constrained_nodes`] | hanging nodes; nodes with moments |
-//! | `batch`, `select`, `given` | batches of particles; which particles take part; columns given in place of theirs |
+//! | `batch`, `select`, `given` | batches of particles; which take part; columns in place of theirs |
 use bytemuck::{Pod, Zeroable};
 
 use self::batch::Batch;

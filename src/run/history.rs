@@ -12,7 +12,6 @@ use crate::load::Water;
 use crate::material::{Failed, SHOCK_SUMS};
 use crate::probe::Readings;
 use crate::row::{AXES, Row};
-use crate::setup;
 use crate::solver::diagnostics::totals::{GridTotals, ParticleTotals};
 use crate::solver::migration::crossings::Crossings;
 use crate::solver::state::bookings::{FAILED_SUMS, ForceAndWork, Reaction, SOURCE_SUMS};
@@ -80,7 +79,7 @@ fn add<const D: usize>(row: &mut Row, problem: &Problem<D>, of: Option<&Totals<'
     if problem.adaptivity.is_some() {
         of_ledger(row, of.and_then(|of| of.ledger.as_ref()));
     }
-    if setup::physics(problem).has_fluids() {
+    if problem.materials.iter().any(|material| material.build().is_fluid()) {
         row.add(format_args!("shift_work"), "J", of.and_then(|of| of.shift_work));
     }
     if problem.viscosity.is_some() {

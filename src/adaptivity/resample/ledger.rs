@@ -62,19 +62,14 @@ impl Ledger {
         saved.count(NEXT_ROOT, &mut self.next_root);
     }
 
-    /// Collective. Counts of all ranks and the two energies.
-    fn gather(&self, comm: &Comm) -> ([u64; 4], [ExactSum; 2]) {
+    /// Collective. Totals of all ranks; energies are exact before they are rounded once.
+    pub fn total(&self, comm: &Comm) -> LedgerTotals {
         let mut counts = [self.splits, self.refused, self.merges, self.removed];
         comm.sum_u64(&mut counts);
         let mut energies = [self.split_energy.clone(), self.merge_energy.clone()];
         ExactSum::sum_over_ranks(comm, &mut energies);
-        (counts, energies)
-    }
-
-    /// Collective. Totals of all ranks; energies are exact before they are rounded once.
-    pub fn total(&self, comm: &Comm) -> LedgerTotals {
-        let ([splits, refused, merges, removed], [split_energy, merge_energy]) = self.gather(comm);
-        let (split_energy, merge_energy) = (split_energy.to_f64(), merge_energy.to_f64());
+        let [splits, refused, merges, removed] = counts;
+        let [split_energy, merge_energy] = energies.each_ref().map(ExactSum::to_f64);
         LedgerTotals { splits, refused, merges, removed, split_energy, merge_energy }
     }
 

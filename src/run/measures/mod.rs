@@ -27,10 +27,8 @@ fn measure(kind: &str, name: &str, what: &str) -> String {
 /// goes on.
 pub(super) fn save<const D: usize>(problem: &Problem<D>, solver: &mut Solver<D>, saved: &mut Saved<'_>) {
     let measured = &mut solver.measured;
-    for (flux, sum) in problem.fluxes.iter().zip(&mut measured.crossings.fluxes.sums) {
-        let sum = std::iter::once(sum);
-        saved.if_there(|saved| saved.sums(|_| measure("flux", &flux.name, ""), sum));
-    }
+    let passed = measured.crossings.fluxes.sums.iter_mut();
+    saved.if_there(|saved| saved.sums(|i| measure("flux", &problem.fluxes[i].name, ""), passed));
     for (track, tracked) in problem.tracks.iter().zip(&mut measured.tracked) {
         let number = |what: &str| measure("track", &track.name, what);
         // Halves of an identifier are numbers that counts may be.

@@ -83,15 +83,7 @@ impl Fluxes {
     pub fn passed<const D: usize>(&self, comm: &Comm, chunks: &[Chunk<D>]) -> Vec<f64> {
         let mut now = self.clone();
         now.add_beyond(chunks, 1.0);
-        now.gather(comm).iter().map(ExactSum::to_f64).collect()
-    }
-
-    /// Collective. Masses over all ranks, exact.
-    pub fn gather(&self, comm: &Comm) -> Vec<ExactSum> {
-        let mut sums = self.sums.clone();
-        if !sums.is_empty() {
-            ExactSum::sum_over_ranks(comm, &mut sums);
-        }
-        sums
+        ExactSum::sum_over_ranks(comm, &mut now.sums);
+        now.sums.iter().map(ExactSum::to_f64).collect()
     }
 }

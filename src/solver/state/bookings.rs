@@ -49,9 +49,7 @@ impl<const N: usize> ExactSums<N> {
     /// Collective. Totals over all ranks, exact before they are rounded once.
     pub fn totals(&self, comm: &Comm) -> Vec<[f64; N]> {
         let mut all: Vec<ExactSum> = self.of.iter().flatten().cloned().collect();
-        if !all.is_empty() {
-            ExactSum::sum_over_ranks(comm, &mut all);
-        }
+        ExactSum::sum_over_ranks(comm, &mut all);
         all.chunks_exact(N).map(|sums| std::array::from_fn(|i| sums[i].to_f64())).collect()
     }
 
