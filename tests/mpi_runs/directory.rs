@@ -72,6 +72,18 @@ fn one_run_at_a_time() {
     Outcome::read(killed.path(), NAME).assert_same(&whole, "killed");
 }
 
+/// Programs that no launcher has started share nothing: Open MPI's folder for them, if they had one, would
+/// be removed by one that ends while another makes its own in it, and one start in a hundred would fail.
+#[test]
+fn runs_alone_share_no_folder() {
+    let _turn = in_turn();
+    let home = tempfile::tempdir().expect("temporary directory");
+    let temporary = home.path().join("temporary");
+    let job = variant(home.path(), "short", ("end = 0.05", "end = 1e-6"));
+    succeed(run(home.path(), 1, 1, &job, &["--quiet"]).env("TMPDIR", &temporary));
+    assert!(!temporary.exists(), "what had been made there is gone, but the folder around it remains");
+}
+
 #[test]
 fn a_forgotten_restart_destroys_nothing() {
     let _turn = in_turn();
