@@ -33,7 +33,8 @@ pub struct Arguments {
     /// Start again even if that replaces checkpoints or the results of another job.
     #[arg(long, conflicts_with = "restart")]
     pub overwrite: bool,
-    /// Threads of each rank; by default the cores of its machine divided by the ranks there.
+    /// Threads of each rank; by default RAYON_NUM_THREADS, or the cores of its machine divided by the ranks
+    /// there.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
     pub threads: Option<u16>,
     /// Print only errors and warnings.
@@ -175,10 +176,12 @@ fn print(
     Ok(())
 }
 
-/// Collective. Starts the threads of this rank.
+/// Collective. Starts the threads of this rank: as many as wanted, else as the variable of rayon says, else its
+/// share of the cores.
 pub(super) fn start_threads(comm: &Comm, wanted: Option<u16>) -> Result<usize, Failure> {
     let cores = Cores::survey(comm);
-    let threads = wanted.map_or_else(|| cores.threads(), usize::from);
+    let said = || std::env::var("RAYON_NUM_THREADS").ok()?.parse().ok().filter(|threads| *threads > 0);
+    let threads = wanted.map(usize::from).or_else(said).unwrap_or_else(|| cores.threads());
     // The main thread works too; handing each small loop to another thread would cost more than the loop.
     rayon::ThreadPoolBuilder::new()
         .num_threads(threads)
