@@ -118,7 +118,8 @@ fn soil() {
 }
 
 #[test]
-fn safety() {
+#[ignore = "nightly: takes a minute"]
+fn safety_nightly() {
     follow("safety");
 }
 
@@ -128,7 +129,8 @@ fn metal() {
 }
 
 #[test]
-fn effects() {
+#[ignore = "nightly: takes a minute"]
+fn effects_nightly() {
     follow("effects");
 }
 
