@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use crate::Failure;
 use agimp::io::series::Series;
-use agimp::io::snapshot::directory::{is_of_tree, listed, outputs_without_index, run_of, runs, series_path};
+use agimp::io::snapshot::directory::{is_of_tree, outputs_without_index, run_of, runs, series_path};
 use agimp::job;
 use agimp::text::shell_word;
 
@@ -99,7 +99,7 @@ fn of_directory(directory: &Path, name: Option<&str>) -> Result<(Option<PathBuf>
         }
     };
     let index = series_path(directory, name);
-    let files = match listed(&index) {
+    let files = match Series::listed(&index) {
         Some(entries) => entries.into_iter().map(|entry| directory.join(entry.name)).collect(),
         None => outputs_without_index(directory, name),
     };

@@ -615,63 +615,6 @@ fn outputs_checkpoints_and_the_latest() {
     );
 }
 
-/// Earlier versions named their files `.vtkhdf`. A run restarts from them, its index goes on to list them,
-/// and its checkpoints replace theirs.
-#[test]
-fn files_named_by_earlier_versions_are_found_and_continued() {
-    let earlier = |path: PathBuf| path.with_file_name(name(&path).replace(".hdf", ".vtkhdf"));
-    fn name(path: &Path) -> String {
-        path.file_name().expect("a name").to_string_lossy().into_owned()
-    }
-    on_ranks(
-        "files_named_by_earlier_versions_are_found_and_continued",
-        &[1],
-        |comm, directory| {
-            let run = Run::<2>::example(0..6, 9);
-            let at = |i: u64| View { step: 10 * i, time: 0.1 * i as f64, ..run.view() };
-            let mut outputs = Outputs::create(comm, directory, "old", options()).expect("created");
-            for i in 0..3 {
-                outputs.write(comm, &at(i)).expect("written");
-                outputs.checkpoint(comm, &at(i), 9).expect("written");
-            }
-            outputs.settle(comm).expect("on disk");
-            for entry in std::fs::read_dir(directory).expect("listed") {
-                let path = entry.expect("listed").path();
-                if name(&path).ends_with(".series") {
-                    let text = std::fs::read_to_string(&path).expect("index");
-                    std::fs::write(&path, text.replace(".hdf", ".vtkhdf")).expect("written");
-                }
-                std::fs::rename(&path, earlier(path.clone())).expect("renamed");
-            }
-            // An output that its index does not list is of another run.
-            std::fs::copy(
-                earlier(output_path(directory, "old", 2)),
-                earlier(output_path(directory, "old", 9)),
-            )
-            .expect("copied");
-            let latest = candidates(directory, "old", None).expect("listed").whole.swap_remove(0).0;
-            assert_eq!(latest, earlier(checkpoint_path(directory, "old", 20)));
-            let back = snapshot::read::<2>(comm, &latest, None, LIMITS).expect("read");
-            assert_eq!(back.header.step, 20);
-
-            let mut outputs = Outputs::resume(comm, directory, "old", options(), 2, 0.1).expect("resumed");
-            outputs.write(comm, &at(2)).expect("written");
-            outputs.checkpoint(comm, &at(2), 1).expect("written");
-            outputs.settle(comm).expect("on disk");
-            let latest = candidates(directory, "old", None).expect("listed").whole.swap_remove(0).0;
-            assert_eq!(latest, checkpoint_path(directory, "old", 20), "of both names the new one");
-            assert!(!earlier(checkpoint_path(directory, "old", 10)).exists(), "replaced by a later one");
-            for series in ["old.hdf.series", "old.tree.hdf.series"] {
-                let text = std::fs::read_to_string(directory.join(series)).expect("index");
-                let listed = |file: &str| text.contains(&format!("\"old_{file}"));
-                assert!(listed("000000.") && text.contains(".vtkhdf"), "{text}");
-                assert!(listed("000002.hdf") || listed("000002.tree.hdf"), "{text}");
-            }
-        },
-        |_| {},
-    );
-}
-
 #[test]
 fn differences_are_named() {
     on_ranks(

@@ -3,8 +3,9 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use agimp::io::hdf5_file::Reader;
+use agimp::io::series::Series;
 use agimp::io::snapshot::Header;
-use agimp::io::snapshot::directory::{self, listed, series_path};
+use agimp::io::snapshot::directory::{self, series_path};
 use agimp::run::at_end::ending::Ending;
 use agimp::run::at_end::report::{self, Report};
 use agimp::run::claim;
@@ -71,7 +72,7 @@ impl Results {
 
     /// Outputs in order of time.
     pub(super) fn outputs(&self) -> Vec<PathBuf> {
-        let entries = listed(&series_path(&self.directory, &self.name)).unwrap_or_default();
+        let entries = Series::listed(&series_path(&self.directory, &self.name)).unwrap_or_default();
         entries
             .into_iter()
             .map(|entry| self.directory.join(entry.name))

@@ -1,10 +1,8 @@
 """Names of the files of a run, and how its outputs are found.
 
-    NAME_000000.EXT          particles          NAME.EXT.series          times of these
-    NAME_000000.tree.EXT     leaves             NAME.tree.EXT.series
-    NAME.checkpoint_000001000.EXT               NAME.history.csv, NAME.telemetry.jsonl
-
-EXT is `hdf` or `vtkhdf`, whichever the program that wrote them uses.
+    NAME_000000.hdf          particles          NAME.hdf.series          times of these
+    NAME_000000.tree.hdf     leaves             NAME.tree.hdf.series
+    NAME.checkpoint_000001000.hdf               NAME.history.csv, NAME.telemetry.jsonl
 """
 
 from __future__ import annotations
@@ -18,11 +16,9 @@ from typing import NamedTuple
 from . import _toml
 from ._errors import FileRefused
 
-ENDINGS = ("hdf", "vtkhdf")
-_ENDING = r"\.(?:hdf|vtkhdf)"
-_SERIES = re.compile(rf"(?P<name>.+?)(?P<tree>\.tree)?{_ENDING}\.series")
-_OUTPUT = re.compile(rf"(?P<name>.+)(?<!\.checkpoint)_(?P<number>\d{{6,}}){_ENDING}")
-_CHECKPOINT = re.compile(rf"(?P<name>.+)\.checkpoint_(?P<step>\d+){_ENDING}")
+_SERIES = re.compile(rf"(?P<name>.+?)(?P<tree>\.tree)?\.hdf\.series")
+_OUTPUT = re.compile(rf"(?P<name>.+)(?<!\.checkpoint)_(?P<number>\d{{6,}})\.hdf")
+_CHECKPOINT = re.compile(rf"(?P<name>.+)\.checkpoint_(?P<step>\d+)\.hdf")
 
 
 class Place(NamedTuple):
@@ -70,11 +66,9 @@ def output_directory(job: Path) -> Path:
 
 def outputs(place: Place) -> list[tuple[Path, float | None]]:
     """The outputs in order, with their times as the index tells; without an index all that are there."""
-    indices = [place.directory / f"{place.name}.{ending}.series" for ending in ENDINGS]
-    present = [index for index in indices if index.exists()]
-    if present:
-        # A run made again by another version of the program may have left an index under the other name.
-        return _index(max(present, key=lambda index: index.stat().st_mtime))
+    index = place.directory / f"{place.name}.hdf.series"
+    if index.exists():
+        return _index(index)
     numbered = _matching(place.directory, _OUTPUT, place.name)
     return [(path, None) for _, path in sorted((int(match["number"]), path) for path, match in numbered)]
 

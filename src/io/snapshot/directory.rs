@@ -9,9 +9,6 @@ use crate::io::series::{Entry, Series};
 /// How names of files in ParaView's format end. Every ParaView that reads the format (5.11 and newer) opens
 /// `.hdf`; the longer `.vtkhdf` is unknown to 5.11.
 const ENDING: &str = ".hdf";
-/// Endings under which the files of a run are found; earlier versions of agimp ended their names in
-/// `.vtkhdf`.
-const KNOWN_ENDINGS: [&str; 2] = [ENDING, ".vtkhdf"];
 
 /// Path of output number `number` of the run `name`.
 pub fn output_path(directory: &Path, name: &str, number: u64) -> PathBuf {
@@ -33,18 +30,9 @@ pub fn tree_series_path(directory: &Path, name: &str) -> PathBuf {
     directory.join(format!("{name}.tree{ENDING}.series"))
 }
 
-/// Not collective. The entries of an index, or of the one that an earlier version has left in its place, if
-/// either can be read.
-pub fn listed(series: &Path) -> Option<Vec<Entry>> {
-    KNOWN_ENDINGS.iter().find_map(|ending| {
-        let name = file_name(series).strip_suffix(&format!("{ENDING}.series"))?;
-        Series::listed(&series.with_file_name(format!("{name}{ending}.series")))
-    })
-}
-
 /// Name of a file of a run, without its ending.
 fn stem(name: &str) -> Option<&str> {
-    KNOWN_ENDINGS.iter().find_map(|ending| name.strip_suffix(ending))
+    name.strip_suffix(ENDING)
 }
 
 /// Part of a name between the number of an output and the ending of its tree.
@@ -76,7 +64,7 @@ pub struct Candidates {
 /// counts.
 pub fn candidates(directory: &Path, name: &str, job_digest: Option<u64>) -> Result<Candidates, FileError> {
     let mut found = Candidates::default();
-    let listed = listed(&series_path(directory, name));
+    let listed = Series::listed(&series_path(directory, name));
     let is_listed = |name: &str| {
         listed.as_ref().is_none_or(|entries: &Vec<Entry>| entries.iter().any(|entry| entry.name == name))
     };
@@ -93,8 +81,8 @@ pub fn candidates(directory: &Path, name: &str, job_digest: Option<u64>) -> Resu
             Err(error) => found.damaged.push(error),
         }
     }
-    // Of one step, present names first, and checkpoints before outputs.
-    found.whole.sort_by_key(|(path, step)| (std::cmp::Reverse(*step), !file_name(path).ends_with(ENDING)));
+    // Of one step, checkpoints come before outputs.
+    found.whole.sort_by_key(|(_, step)| std::cmp::Reverse(*step));
     Ok(found)
 }
 
@@ -241,10 +229,7 @@ fn results(directory: &Path, name: &str) -> Result<Vec<(Kind, u64, PathBuf)>, Fi
         (is_number && path.is_file()).then_some((kind, digits.parse().ok()?, path))
     };
     let mut found: Vec<_> = files(directory)?.into_iter().filter_map(result).collect();
-    // Of two names for one number the present one is the later.
-    found.sort_by_key(|(kind, number, path): &(Kind, u64, PathBuf)| {
-        (*kind, *number, file_name(path).ends_with(ENDING))
-    });
+    found.sort_by_key(|(kind, number, _): &(Kind, u64, PathBuf)| (*kind, *number));
     Ok(found)
 }
 

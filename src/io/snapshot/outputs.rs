@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use partition::comm::Comm;
 
 use super::directory::{
-    checkpoint_path, listed, output_path, remove_old_checkpoints, series_path, tree_path, tree_series_path,
+    checkpoint_path, output_path, remove_old_checkpoints, series_path, tree_path, tree_series_path,
 };
 use super::intact::commit::Unnamed;
 use super::{Options, View, start_write, write, write_tree};
@@ -67,7 +67,7 @@ impl Outputs {
         }))?;
         let series = |path: PathBuf| match from {
             Some((_, time)) if comm.rank() == 0 => {
-                Series::resume(&path, listed(&path).unwrap_or_default(), time)
+                Series::resume(&path, Series::listed(&path).unwrap_or_default(), time)
             }
             _ => Series::new(&path),
         };

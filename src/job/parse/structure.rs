@@ -4,7 +4,6 @@
 //! each, and can explain a key.
 use super::error::{Fault, MOST, QUOTED, alternatives};
 use super::source::{Node, Path, Value as Toml};
-use crate::job::schema::GONE;
 use crate::text::{excerpt, nearest};
 use serde_json::Value;
 
@@ -257,18 +256,6 @@ impl<'s> Checker<'s> {
                 return;
             }
             let whole = path.key(key.clone()).to_string();
-            if let Some((_, why)) = GONE.iter().find(|(gone, _)| *gone == whole) {
-                let (message, span) = (format!("the key `{key}` was removed: {why}"), inner.key_span.clone());
-                self.faults.push(Fault {
-                    key: whole,
-                    message,
-                    span,
-                    help: None,
-                    setting: None,
-                    included: None,
-                });
-                continue;
-            }
             // A misspelt key was most likely meant to be one that is missing.
             let keys = layers.properties().filter(|(_, schema)| self.fits(schema)).map(|(known, _)| known);
             // A key that is there already is meant where it is very near, as in a setting of the command

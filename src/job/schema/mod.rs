@@ -18,9 +18,3 @@ pub mod output;
 pub mod probes;
 pub mod reference;
 pub mod stages;
-
-/// Keys that files of earlier versions may have: path, and why the key is gone with what to do.
-pub(super) const GONE: [(&str, &str); 1] = [(
-    "adaptivity.travel",
-    "the tree changes every adaptivity.every_steps steps; remove the key, and increase every_steps if regrids take too much time",
-)];
