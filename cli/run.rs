@@ -176,8 +176,8 @@ fn print(
     Ok(())
 }
 
-/// Collective. Starts the threads of this rank: as many as wanted, else as the variable of rayon says, else its
-/// share of the cores.
+/// Collective. Starts the threads of this rank: as many as wanted, else as the variable of rayon says, else
+/// its share of the cores.
 pub(super) fn start_threads(comm: &Comm, wanted: Option<u16>) -> Result<usize, Failure> {
     let cores = Cores::survey(comm);
     let said = || std::env::var("RAYON_NUM_THREADS").ok()?.parse().ok().filter(|threads| *threads > 0);
