@@ -288,7 +288,7 @@ fn same_bits_on_any_ranks_and_across_restart() {
         [adaptivity]\nevery_steps = 5\n[[adaptivity.criteria]]\nkind = 'plastic_strain'\nrefine = 0.005\nlevel = 1\n\
         [[adaptivity.criteria]]\nkind = 'head_gradient'\nrefine = 0.5\nlevel = 2\n\
         [[stages]]\nname = 'dry'\nduration = 0.015\n[[stages]]\nname = 'wet'\n\
-        [history]\nevery_steps = 5\n[checkpoint]\nevery_steps = 20\nkeep = 99\n[time]\nend = 0.04\n[output]\npicture = false\n\
+        [history]\nevery_steps = 5\n[checkpoint]\nevery_steps = 20\nkeep = 99\n[time]\nend = 0.06\n[output]\npicture = false\n\
         fields = ['pore_pressure', 'head', 'total_stress']\n";
     restart::assert_same_on_any_ranks(text, "seepage", |_, _| {});
 }
