@@ -170,9 +170,6 @@ fn print(
         more => writeln!(out, ", {more} warnings")?,
     }
     ended::hints(out, summary, results.directory, results.name, matches!(page, Some(Ok(_))))?;
-    if let Some(collapse) = &summary.collapse {
-        writeln!(out, "{collapse}")?;
-    }
     Ok(())
 }
 

@@ -38,10 +38,7 @@ fn coordinates_are_relative_to_the_lower_corner() {
     assert_eq!(problem.origin, [-0.288, -0.288, 0.0]);
     assert_eq!(problem.brick.roots, [6, 6, 1]);
     assert!((problem.bodies[0].centre[0] - 0.288).abs() < 1e-15);
-    let Some(problem::ReportSetup::ColumnCollapse { base, up, .. }) = problem.report else {
-        panic!("no report")
-    };
-    assert_eq!((base, up), ([0.288, 0.288, 0.0], 2));
+    assert_eq!(problem.probes[0].foot, Some([0.288, 0.288, 0.0]));
 }
 
 /// The schema has the limits of the tree.

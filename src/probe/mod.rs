@@ -33,6 +33,9 @@ pub struct Probe<const D: usize> {
     pub bodies: Option<Vec<u16>>,
     /// Quantities that it measures, each once.
     pub quantities: Vec<Measured>,
+    /// Point below the middle of a deposit, m from the lower corner of the domain; given if quantities need
+    /// it.
+    pub foot: Option<[f64; D]>,
 }
 
 impl<const D: usize> Probe<D> {
@@ -76,6 +79,13 @@ pub enum Measured {
     PorePressure,
     /// Least and greatest coordinates of particles along each axis, m.
     Extent,
+    /// Distance in plan from the foot of the probe within which 98 % of the mass lies, m.
+    RunOut,
+    /// Distance in plan from the foot to the outer edge of the deposit, m: gaps between particles beyond the
+    /// run-out are no wider than their boxes.
+    Edge,
+    /// Height of the deposit above the foot, m, within a twentieth of the run-out about it.
+    Height,
 }
 
 /// Ends of the names of the components of a stress.
@@ -134,7 +144,15 @@ impl Measured {
                     row.vector(format_args!("{stem}{suffix}"), axes, "m", of.map(place));
                 }
             }
+            Self::RunOut => add("run_out", "m", of.map(|of| of.deposit.run_out)),
+            Self::Edge => add("edge", "m", of.map(|of| of.deposit.edge)),
+            Self::Height => add("height", "m", of.map(|of| of.deposit.height)),
         }
+    }
+
+    /// Whether it is counted from the foot of a probe.
+    pub fn needs_foot(self) -> bool {
+        matches!(self, Self::RunOut | Self::Edge | Self::Height)
     }
 }
 
@@ -161,13 +179,31 @@ pub struct Readings<const D: usize> {
     pub greatest_speed: f64,
     /// Least and greatest coordinates, m, from the lower corner of the domain; infinite without particles.
     pub extent: [[f64; D]; 2],
+    /// Shape of the deposit about the foot of the probe.
+    pub deposit: Deposit,
+}
+
+/// A deposit about a foot; not a number without material or a foot.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Deposit {
+    /// Distance within which 98 % of the mass lies, m.
+    pub run_out: f64,
+    /// Distance of its outer edge, m.
+    pub edge: f64,
+    /// Height above the foot, m.
+    pub height: f64,
+}
+
+impl Deposit {
+    /// No material.
+    pub const NONE: Self = Self { run_out: f64::NAN, edge: f64::NAN, height: f64::NAN };
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    const ALL: [Measured; 14] = [
+    const ALL: [Measured; 17] = [
         Measured::Mass,
         Measured::Volume,
         Measured::Centre,
@@ -182,6 +218,9 @@ mod tests {
         Measured::PlasticStrain,
         Measured::PorePressure,
         Measured::Extent,
+        Measured::RunOut,
+        Measured::Edge,
+        Measured::Height,
     ];
 
     fn check<const D: usize>() {
@@ -196,6 +235,7 @@ mod tests {
             volume_pores: 0.0,
             greatest_speed: 0.0,
             extent: [[f64::INFINITY; D], [f64::NEG_INFINITY; D]],
+            deposit: Deposit::NONE,
         };
         let add = |row: &mut Row, of| ALL.iter().for_each(|q| q.add_to::<D>(row, "_p", of, &[0.0; 3]));
         let values = Row::values(|row| add(row, Some(&nothing)));

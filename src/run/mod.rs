@@ -34,7 +34,7 @@ use partition::comm::{Comm, Disagreement};
 
 use self::at_end::ending::Ending;
 use self::at_end::safety::Safety;
-use self::at_end::{collapse, ending, report};
+use self::at_end::{ending, report};
 use self::claim::Claim;
 use self::cores::Cores;
 use self::names::Names;
@@ -458,24 +458,12 @@ impl<'a, const D: usize> Run<'a, D> {
         self.tell_unsettled_heads();
         self.tell_torn();
         let picture = self.picture();
-        let collapse = self.problem.report.as_ref().map(|setup| {
-            let mass = self.solver.particle_totals().mass;
-            let coordinates = self.problem.coordinates;
-            collapse::evaluate(
-                self.comm,
-                setup,
-                (self.problem.size(), coordinates),
-                &self.solver.chunks,
-                mass,
-            )
-        });
         let summary = Summary {
             effort: self.recorder.effort(&self.solver),
             last_output: self.outputs.last(),
             series: self.outputs.series().to_owned(),
             picture,
             is_still: self.problem.quasi_static.is_some(),
-            collapse,
         };
         self.recorder.report(&self.solver, &summary);
         Ok(summary)

@@ -4,7 +4,6 @@ use std::path::{Path, PathBuf};
 use partition::comm::Disagreement;
 
 use crate::io::hdf5_file::FileError;
-use crate::run::at_end::collapse::Collapse;
 use crate::solver::Clock;
 
 /// How a run is started.
@@ -62,8 +61,6 @@ pub struct Summary {
     pub picture: Result<Option<PathBuf>, String>,
     /// Whether all is at rest in outputs, as between load steps.
     pub is_still: bool,
-    /// Evaluation that the job asks for.
-    pub collapse: Option<Collapse>,
 }
 
 /// Why a run could not be started or finished; the same on all ranks.

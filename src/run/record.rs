@@ -395,7 +395,6 @@ impl<'a, const D: usize> Recorder<'a, D> {
             history: columns.map(entry).collect(),
             stages: stages.map(|(stage, start)| (stage.name.clone(), *start)).collect(),
             factor_of_safety: Safety::of(solver),
-            column_collapse: summary.collapse.as_ref().map(Into::into),
             outputs: summary.series.clone(),
             picture: summary.picture.clone().ok().flatten(),
             ..std::mem::take(&mut self.report)

@@ -6,16 +6,16 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use agimp::io::hdf5_file::{FileError, Reader};
-use agimp::job::problem::CollapseLaw;
-use agimp::run::at_end::collapse::{Published, published};
 use post::frame::Frame;
 
 #[path = "../common.rs"]
 mod common;
+mod laws;
 #[path = "../verification/plot.rs"]
 mod plot;
 
 use common::checked;
+use laws::{CollapseLaw, Published, published};
 use plot::{Chart, Series};
 
 const ASPECTS: [f64; 4] = [0.55, 0.9, 1.25, 2.75];

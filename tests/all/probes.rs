@@ -23,7 +23,8 @@ const TWO_BLOCKS: &str = "version = 1\ndimension = 2\ngravity = [0, -10]\n[domai
     [[bodies]]\nname = 'right'\nmaterial = 'm'\nshape = { kind = 'box', min = [2.25, 1], max = [2.75, 1.5] }\nvelocity = [0, 2]\n\
     [[probes]]\nname = 'left'\nbodies = ['left']\nquantities = ['mass', 'centre', 'velocity', 'momentum', 'kinetic_energy', 'extent', 'volume']\n\
     [[probes]]\nname = 'right'\nbodies = ['right']\nquantities = ['mass', 'centre', 'velocity', 'momentum', 'kinetic_energy', 'extent', 'greatest_speed']\n\
-    [[probes]]\nname = 'below'\nshape = { kind = 'box', min = [1, 0], max = [3, 0.5] }\nquantities = ['mass', 'centre', 'stress', 'pressure']\n";
+    [[probes]]\nname = 'below'\nshape = { kind = 'box', min = [1, 0], max = [3, 0.5] }\nquantities = ['mass', 'centre', 'stress', 'pressure']\n\
+    [[probes]]\nname = 'under'\nbodies = ['right']\nfoot = [2.5, 0]\nquantities = ['run_out', 'edge', 'height']\n";
 
 /// Bodies in free flight: centre, velocity and energy of each are those of a parabola, sums over bodies those
 /// of the run, and a shape that nothing has reached has no mass and no mean.
@@ -49,6 +50,13 @@ fn bodies_in_flight_follow_their_parabolas() {
         (history.last("centre_left_x") - 1.375).abs() < 1e-12
             && (history.last("volume_left") - 0.125).abs() < 1e-12
     );
+    // The outermost column of its particles has more than 2 % of its mass; its centre is 1/16 m from the edge.
+    for (what, exact) in [("run_out", 0.25 - 1.0 / 16.0), ("edge", 0.25)] {
+        let found = history.last(&format!("{what}_under"));
+        assert!((found - exact).abs() < 1e-3 * exact, "{what}: {found} for {exact}");
+    }
+    let top = history.last("greatest_right_y") + 1.0 / 16.0;
+    assert!((history.last("height_under") - top).abs() < 1e-12, "{} for {top}", history.last("height_under"));
     let (fastest, mean) = (history.last("greatest_speed_right"), history.last("velocity_right_y").abs());
     assert!((fastest - mean).abs() < 1e-13 * mean, "{fastest} {mean}");
     let total = history.last("momentum_left_y") + history.last("momentum_right_y");
@@ -300,6 +308,35 @@ fn maps_keep_the_largest_depth_and_speed() {
         }
         assert_eq!(*first.get_or_insert(texts.clone()), texts);
     });
+}
+
+/// A cone on the ground, as a quarter in space and as a body of revolution, with a grain far off: 98 % of its
+/// mass lies within 0.918 of its radius, and the grain is no part of it.
+#[test]
+fn a_deposit_has_a_run_out_an_edge_and_a_height() {
+    let rest = "[[materials]]\nname = 'sand'\ndensity = 1000\nmodel = 'neo_hookean'\nyoung = 1e5\npoisson = 0.3\n\
+                [time]\nend = 1e-4\n[output]\npicture = false\n";
+    let in_space = "version = 1\ndimension = 3\n[domain]\nsize = [1.5, 1.5, 0.75]\nroot_edge = 0.1875\n\
+        [[bodies]]\nname = 'heap'\nmaterial = 'sand'\n\
+        shape = { kind = 'intersection', parts = [{ kind = 'box', min = [0, 0, 0], max = [1, 1, 1] }, \
+            { kind = 'cone', base = [0, 0, 0], axis = [0, 0, 1], radius = 1, height = 0.5 }] }\n\
+        [[bodies]]\nname = 'grain'\nmaterial = 'sand'\nshape = { kind = 'box', min = [1.2, 0, 0], max = [1.3, 0.1, 0.1] }\n\
+        [[probes]]\nname = 'heap'\nbodies = ['heap']\nfoot = [0, 0, 0]\nquantities = ['run_out', 'edge', 'height']\n\
+        [[probes]]\nname = 'all'\nfoot = [0, 0, 0]\nquantities = ['edge']\n";
+    let of_revolution = "version = 1\ndimension = 2\ngeometry = 'axisymmetric'\n[domain]\nsize = [1.5, 0.75]\nroot_edge = 0.09375\n\
+        [[bodies]]\nname = 'heap'\nmaterial = 'sand'\nshape = { kind = 'polygon', points = [[0, 0], [1, 0], [0, 0.5]] }\n\
+        [[bodies]]\nname = 'grain'\nmaterial = 'sand'\nshape = { kind = 'box', min = [1.2, 0], max = [1.23, 0.03] }\n\
+        [[probes]]\nname = 'heap'\nbodies = ['heap']\nfoot = [0, 0]\nquantities = ['run_out', 'edge', 'height']\n\
+        [[probes]]\nname = 'all'\nfoot = [0, 0]\nquantities = ['edge']\n";
+    for (name, job) in [("in_space", in_space), ("of_revolution", of_revolution)] {
+        let (history, _) = history_of(name, &format!("{job}{rest}"));
+        let heap = [("run_out_heap", 0.918, 0.02), ("edge_heap", 1.0, 0.03), ("height_heap", 0.5, 0.03)];
+        for (what, exact, allowed) in heap.into_iter().chain([("edge_all", 1.0, 0.03)]) {
+            let found = history.last(what);
+            println!("{name}: {what} {found} for {exact}");
+            assert!((found - exact).abs() < allowed, "{name}: {what} {found} for {exact}");
+        }
+    }
 }
 
 /// A spinning disk of sand flies apart into particles that have nothing around them: they fill their boxes,

@@ -189,7 +189,7 @@ fn a_run_that_is_over_has_its_report_again() {
         serde_json::from_slice(&std::fs::read(&report).expect("report")).expect("JSON")
     };
     let before = read();
-    let steady = ["history", "particles", "steps", "time", "digest", "outputs", "picture", "column_collapse"];
+    let steady = ["history", "particles", "steps", "time", "digest", "outputs", "picture"];
     assert!(
         before["particles"].as_u64() > Some(0)
             && before["history"].as_object().is_some_and(|h| h.len() >= 20)

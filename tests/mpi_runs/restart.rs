@@ -203,10 +203,6 @@ fn says_where_results_are(shown: &str) {
         "draw     agimp plot out/collapse_2d/collapse_2d_",
         "play     agimp movie out/collapse_2d/collapse_2d.hdf.series",
         "read     agimp report out/collapse_2d",
-        "column collapse, aspect ratio",
-        "  run-out radius  ",
-        "  outer edge ",
-        "  final height ",
     ];
     let lines: Vec<&str> = shown.lines().collect();
     assert_eq!(lines.len(), expected.len(), "{shown}");

@@ -34,7 +34,7 @@ pub use figures::Options;
 use figures::{charts, pictures};
 pub use results::{Results, Unclear};
 use run::Run;
-use sections::{collapse, costs, ending, facts, files, job, remarks, table};
+use sections::{costs, ending, facts, files, job, remarks, table};
 
 const PAGE: &str = include_str!("page.html");
 const STYLE: &str = include_str!("page.css");
@@ -71,7 +71,6 @@ fn text(results: &Results, options: &Options) -> Result<String, FileError> {
     charts(&mut body, "curves", "Over time", &panels::panels(&run.history));
     charts(&mut body, "lines", "Along lines", &along::panels(&results.lines()));
     table(&mut body, &run.history);
-    collapse(&mut body, &run);
     costs(&mut body, &run);
     job(&mut body, &run);
     files(&mut body, results);

@@ -61,7 +61,7 @@ const TOGETHER: [(&str, &[(&str, &str)]); 8] = [
 const LOGARITHMIC: [&str; 2] = ["peak_speed", "unbalanced_acceleration"];
 /// Prefixes of the names of loads, probes and colliders in columns; the longest first where one is the start
 /// of another.
-const STEMS: [(&str, &str); 27] = [
+const STEMS: [(&str, &str); 30] = [
     ("angular_momentum", "Angular momentum"),
     ("contact_work", "Work of contact"),
     ("plastic_work", "Plastic work of"),
@@ -81,6 +81,9 @@ const STEMS: [(&str, &str); 27] = [
     ("spin", "Spin of"),
     ("passed", "Mass that has passed"),
     ("extent", "Extent of"),
+    ("run_out", "Run-out of"),
+    ("edge", "Outer edge of"),
+    ("height", "Height of"),
     ("centre", "Displacement of the centre of"),
     ("momentum", "Momentum of"),
     ("displacement", "Displacement of"),

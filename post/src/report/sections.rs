@@ -6,7 +6,7 @@ use super::history::History;
 use super::results::{Results, State};
 use super::run::Run;
 use agimp::io::snapshot;
-use agimp::text::{bytes, count, html, number, quantity, quantity_to, wall_time};
+use agimp::text::{bytes, count, html, number, quantity, wall_time};
 
 /// Summary: time, steps, sizes and cost of the run.
 pub(super) fn facts(body: &mut String, run: &Run) {
@@ -149,38 +149,6 @@ pub(super) fn table(body: &mut String, history: &History) {
     if !zero.is_empty() {
         let _ = writeln!(body, "<p><small>0 throughout: {}</small></p>", zero.join(", "));
     }
-}
-
-/// The deposit of a collapsed column beside published laws.
-pub(super) fn collapse(body: &mut String, run: &Run) {
-    let Some(deposit) = run.report.as_ref().and_then(|report| report.column_collapse.as_ref()) else {
-        return;
-    };
-    section(body, "collapse", "Column collapse");
-    let metres = |value: Option<f64>| value.map_or("–".into(), |value| quantity_to(value, "m", 3));
-    let _ = write!(
-        body,
-        "<p>Height over radius at the start: {}.</p>\n<table><thead><tr><th></th><th>run-out</th><th>height</th></tr></thead>\
-         <tbody>\n<tr><td>this run (98 % of the mass)</td><td>{}</td><td>{}</td></tr>\n",
-        number(deposit.aspect, 4),
-        metres(Some(deposit.run_out)),
-        metres(Some(deposit.height)),
-    );
-    let _ = writeln!(
-        body,
-        "<tr><td>this run (connected deposit)</td><td>{}</td><td></td></tr>",
-        metres(Some(deposit.outer_edge))
-    );
-    for (authors, [run_out, height]) in &deposit.laws {
-        let _ = writeln!(
-            body,
-            "<tr><td>{}</td><td>{}</td><td>{}</td></tr>",
-            html(authors),
-            metres(*run_out),
-            metres(*height)
-        );
-    }
-    body.push_str("</tbody></table>\n");
 }
 
 /// Time by phase.

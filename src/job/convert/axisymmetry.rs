@@ -7,7 +7,7 @@ use super::checks::Checks;
 use crate::boundary::Collider as Solid;
 use crate::geometry::written::Shape;
 use crate::job::parse::source::Path;
-use crate::job::problem::{CollapseLaw, Coordinates, Field};
+use crate::job::problem::{Coordinates, Field};
 use crate::job::schema::common::{AxisName, Spin};
 use crate::job::schema::conditions::colliders::{Collider, Motion, MotionRecord, Row};
 use crate::job::schema::job_file::{self as file, Boundaries, Face, Geometry, JobFile, Quantity};
@@ -127,9 +127,6 @@ pub(super) fn check<const D: usize>(checks: &mut Checks, file: &JobFile, collide
             "total strains",
             "other fields, such as \"displacement\" or \"plastic_strain\"",
         );
-    }
-    if let Some(file::Report::ColumnCollapse { law, .. }) = &file.report {
-        refuse(*law == CollapseLaw::Planar, root.key("report").key("law"), "\"planar\"", "\"axisymmetric\"");
     }
 }
 

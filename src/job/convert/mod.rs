@@ -7,7 +7,7 @@
 //! | `bodies` | bodies |
 //! | `checks` | state that all share: faults with their places, the domain |
 //! | `quasi_static` | load steps, and what jobs with them cannot have |
-//! | `settings` | faces, numerics, output, report |
+//! | `settings` | faces, numerics, output |
 //! | `shapes/` | shapes, among them terrain, and particles from a file |
 //! | `conditions/` | what acts on the material: loads, colliders, contact, sources, stress, water |
 //! | `adaptivity` | dynamic refinement |
@@ -23,7 +23,7 @@ use self::conditions::contact::body_contacts;
 use self::conditions::loads::{gravity, loads};
 use self::conditions::{sources, water};
 use self::materials::materials;
-use self::settings::{digest, faces, numerics, output, report};
+use self::settings::{digest, faces, numerics, output};
 use super::parse::error::{Fault, Position, QUOTED};
 use super::parse::source::{Node, Path};
 use super::problem::*;
@@ -170,10 +170,6 @@ fn problem<const D: usize>(
     output.followed.head = file.water.as_ref().is_some_and(|water| water.seepage.is_some());
     output.followed.saturation =
         file.water.is_some() && materials.iter().any(|m| m.saturated_density != m.density);
-    let report = match &file.report {
-        Some(written) => Some(report(checks, written, (&space, coordinates), &root.key("report"))?),
-        None => None,
-    };
     if is_ring && checks.faults.is_empty() {
         axisymmetry::check(checks, file, colliders.as_deref().unwrap_or(&[]));
     }
@@ -238,7 +234,6 @@ fn problem<const D: usize>(
         lines: lines?,
         maps: maps?,
         telemetry_every: file.telemetry.every_steps,
-        report,
     };
     quasi_static::check(checks, file, &problem);
     for overlap in overlap::find(&problem) {

@@ -2,7 +2,7 @@
 use super::checks::{Checks, Space};
 use crate::job::parse::source::Path;
 use crate::job::schema::job_file::JobFile;
-use crate::job::schema::probes::Flux as Written;
+use crate::job::schema::probes::{Flux as Written, Probe as WrittenProbe};
 use crate::probe::{Flux, Line, Map, Probe, Section, Track};
 
 /// Most cells of a raster.
@@ -26,12 +26,47 @@ pub(super) fn probes<const D: usize>(
             None => Some(None),
         };
         let bodies = checks.bodies(written.bodies.as_deref(), &file.body_names(), &here.key("bodies"));
-        if let (Some(region), Some(bodies)) = (region, bodies) {
+        let foot = foot(checks, written, space, &here);
+        if let (Some(region), Some(bodies), Some(foot)) = (region, bodies, foot) {
             let quantities = written.quantities.clone();
-            all.push(Probe { name: written.name.clone(), region, bodies, quantities });
+            all.push(Probe { name: written.name.clone(), region, bodies, quantities, foot });
         }
     }
     (all.len() == file.probes.len()).then_some(all)
+}
+
+/// The foot of a deposit, if quantities need it, or a fault.
+fn foot<const D: usize>(
+    checks: &mut Checks,
+    written: &WrittenProbe,
+    space: &Space<D>,
+    path: &Path,
+) -> Option<Option<[f64; D]>> {
+    let needs = written.quantities.iter().position(|quantity| quantity.needs_foot());
+    match (&written.foot, needs) {
+        (None, None) => Some(None),
+        (Some(foot), Some(_)) => {
+            let foot: [f64; D] = checks.point(foot, space, &path.key("foot"))?;
+            if (0..D).all(|a| (0.0..=space.size[a]).contains(&foot[a])) {
+                return Some(Some(foot));
+            }
+            let message = format!("found {}; expected a point in the domain", space.words(&foot));
+            checks.fault(&path.key("foot"), message);
+            None
+        }
+        (None, Some(k)) => {
+            let message = "found a quantity of a deposit without its foot; expected foot = [...], the point on the ground \
+                           below its middle";
+            checks.fault(&path.key("quantities").index(k), message.into());
+            None
+        }
+        (Some(_), None) => {
+            let message = "found a foot that no quantity needs; expected \"run_out\", \"edge\" or \"height\" among \
+                           quantities";
+            checks.fault(&path.key("foot"), message.into());
+            None
+        }
+    }
 }
 
 /// All tracks, or faults.
@@ -49,6 +84,11 @@ pub(super) fn tracks<const D: usize>(
         let before = before.chain(file.probes.iter().map(|probe| &*probe.name));
         checks.column_name(&written.name, before, &here.key("name"));
         each_once(checks, &written.quantities, &here.key("quantities"));
+        if let Some(k) = written.quantities.iter().position(|quantity| quantity.needs_foot()) {
+            let message =
+                "found a quantity of a deposit; expected it in probes only: a track follows a particle";
+            checks.fault(&here.key("quantities").index(k), message.into());
+        }
         let point = checks.point(&written.point, space, &here.key("point"));
         let bodies = checks.bodies(written.bodies.as_deref(), &file.body_names(), &here.key("bodies"));
         if let (Some(point), Some(bodies)) = (point, bodies) {

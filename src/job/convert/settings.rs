@@ -1,5 +1,5 @@
-//! From the file's types to a checked problem: faces, numerics, output and report.
-use super::checks::{Checks, Space};
+//! From the file's types to a checked problem: faces, numerics, output.
+use super::checks::Checks;
 use super::conditions::quantities::at_nodes;
 use crate::boundary::Absorbing;
 use crate::boundary::absorbing::AbsorbingFaces;
@@ -196,38 +196,6 @@ pub(super) fn followed(output: &Output) -> Followed {
     Followed { motion, contact_pressure: output.has_any(&[Field::ContactPressure]), ..Followed::default() }
 }
 
-/// The evaluation at the end of the run.
-pub(in crate::job) fn report<const D: usize>(
-    checks: &mut Checks,
-    report: &file::Report,
-    (space, coordinates): (&Space<D>, Coordinates),
-    path: &Path,
-) -> Option<ReportSetup<D>> {
-    let file::Report::ColumnCollapse { base, up, radius, height, law } = report;
-    let base: [f64; D] = checks.vector(base, &path.key("base"))?;
-    let base: [f64; D] = std::array::from_fn(|a| base[a] - space.origin[a]);
-    if (0..D).any(|a| base[a] < -1e-9 * space.size[a] || base[a] > space.size[a] * (1.0 + 1e-9)) {
-        checks.fault(&path.key("base"), "found a point outside the domain; expected one inside".into());
-    }
-    let up = match up {
-        None => D - 1,
-        Some(file::AxisName::X) => 0,
-        Some(file::AxisName::Y) => 1,
-        Some(file::AxisName::Z) => 2,
-    };
-    if up >= D {
-        checks.fault(&path.key("up"), "found \"z\"; expected \"x\" or \"y\" in a 2D job".into());
-        return None;
-    }
-    if D == 2 && coordinates == Coordinates::Cartesian && *law == CollapseLaw::Axisymmetric {
-        checks.fault(
-            &path.key("law"),
-            "found \"axisymmetric\"; expected \"planar\" in a job of plane strain".into(),
-        );
-    }
-    Some(ReportSetup::ColumnCollapse { base, up, radius: *radius, height: *height, law: *law })
-}
-
 /// The part of a job that decides the state.
 pub(in crate::job) fn deciding(file: &JobFile) -> JobFile {
     let mut state = file.clone();
@@ -241,7 +209,6 @@ pub(in crate::job) fn deciding(file: &JobFile) -> JobFile {
     state.lines.clear();
     state.maps.clear();
     state.telemetry = file::Telemetry::default();
-    state.report = None;
     state.time.end = 0.0;
     state
 }

@@ -32,7 +32,7 @@ mod output;
 mod stage;
 
 pub use body::{Body, InitialStress, MaterialSetup, StressKind};
-pub use output::{CheckpointSetup, CollapseLaw, OutputSetup, ReportSetup, TimeSetup};
+pub use output::{CheckpointSetup, OutputSetup, TimeSetup};
 pub use stage::{FactorSearch, InStages, Stage};
 
 /// Cells along the edge of a leaf.
@@ -205,8 +205,6 @@ pub struct Problem<const D: usize> {
     pub maps: Vec<Map>,
     /// Steps between lines of `telemetry.jsonl`.
     pub telemetry_every: u64,
-    /// Evaluation at the end of the run.
-    pub report: Option<ReportSetup<D>>,
 }
 
 impl<const D: usize> Problem<D> {

@@ -50,32 +50,3 @@ pub struct CheckpointSetup {
     /// Checkpoints kept; older ones are deleted once a newer one is complete.
     pub keep: usize,
 }
-
-/// Evaluation at the end of a run.
-#[derive(Clone, Debug, PartialEq)]
-pub enum ReportSetup<const D: usize> {
-    /// Run-out and height of a collapsed granular column beside published laws.
-    ColumnCollapse {
-        /// Centre of the column's foot, m.
-        base: [f64; D],
-        /// The axis that points up.
-        up: usize,
-        /// Initial radius (axisymmetric) or half width (planar), m.
-        radius: f64,
-        /// Initial height, m.
-        height: f64,
-        /// Which laws to compare with.
-        law: CollapseLaw,
-    },
-}
-
-/// Published laws of granular column collapse.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize, schemars::JsonSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum CollapseLaw {
-    /// Cylinders: Lube, Huppert, Sparks, Hallworth, J. Fluid Mech. 508 (2004).
-    #[schemars(extend("x-dimension" = 3))]
-    Axisymmetric,
-    /// Columns between walls: Lube, Huppert, Sparks, Freundt, Phys. Rev. E 72 (2005).
-    Planar,
-}

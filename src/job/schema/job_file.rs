@@ -12,7 +12,7 @@ pub use super::conditions::sources::Source;
 pub use super::conditions::stress::Stress;
 pub use super::conditions::water::Water;
 pub use super::equilibrium::Equilibrium;
-pub use super::output::{Checkpoint, History, Output, Report, Telemetry};
+pub use super::output::{Checkpoint, History, Output, Telemetry};
 pub use super::probes::{Flux, Line, Map, Probe, Track};
 pub use super::stages::Stage;
 use crate::geometry::written::Shape;
@@ -140,9 +140,6 @@ pub struct JobFile {
     /// Performance of the run, `telemetry.jsonl`.
     #[serde(default)]
     pub telemetry: Telemetry,
-    /// Evaluation at the end of the run.
-    #[serde(default)]
-    pub report: Option<Report>,
 }
 
 impl JobFile {

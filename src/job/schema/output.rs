@@ -1,7 +1,6 @@
-//! Files of a run, as a job has them: outputs, checkpoints, history, telemetry, report.
-use super::common::{AxisName, yes};
-use crate::geometry::written::Vector;
-use crate::job::problem::{CollapseLaw, Field};
+//! Files of a run, as a job has them: outputs, checkpoints, history, telemetry.
+use super::common::yes;
+use crate::job::problem::Field;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -144,26 +143,4 @@ impl Default for Telemetry {
     fn default() -> Self {
         Self { every_steps: 100 }
     }
-}
-
-/// Evaluation at the end of the run.
-#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
-#[serde(tag = "kind", rename_all = "snake_case", deny_unknown_fields)]
-pub enum Report {
-    /// Run-out and height of a collapsed granular column, compared with published laws.
-    ColumnCollapse {
-        /// Centre of the column's foot, m.
-        base: Vector,
-        /// Axis that points up; the last one by default.
-        #[serde(default)]
-        up: Option<AxisName>,
-        /// Initial radius (axisymmetric) or half width (planar), m.
-        #[schemars(range(max = 1e12), extend("exclusiveMinimum" = 0.0))]
-        radius: f64,
-        /// Initial height, m.
-        #[schemars(range(max = 1e12), extend("exclusiveMinimum" = 0.0))]
-        height: f64,
-        /// Which laws to compare with.
-        law: CollapseLaw,
-    },
 }

@@ -24,6 +24,10 @@ pub struct Probe {
     #[serde(default = "usual")]
     #[schemars(length(min = 1))]
     pub quantities: Vec<Measured>,
+    /// Point on the ground below the middle of a deposit, m, from which `run_out`, `edge` and `height` are
+    /// counted: heights along the last axis, distances over the others.
+    #[serde(default)]
+    pub foot: Option<Vector>,
 }
 
 fn usual() -> Vec<Measured> {
@@ -44,7 +48,7 @@ pub struct Track {
     #[serde(default)]
     #[schemars(length(min = 1, max = 65_535))]
     pub bodies: Option<Vec<String>>,
-    /// Recorded quantities; centre and velocity by default.
+    /// Recorded quantities, none of a deposit; centre and velocity by default.
     #[serde(default = "usual_of_track")]
     #[schemars(length(min = 1))]
     pub quantities: Vec<Measured>,

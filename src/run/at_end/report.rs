@@ -4,7 +4,6 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
-use super::collapse::Collapse;
 use super::safety::Safety;
 use crate::io::hdf5_file::FileError;
 use crate::io::whole_file::write_whole;
@@ -40,8 +39,6 @@ pub struct Report {
     pub history: BTreeMap<String, (Option<f64>, String)>,
     /// The factor of safety, if a stage looks for it.
     pub factor_of_safety: Option<Safety>,
-    /// Evaluation of a column collapse.
-    pub column_collapse: Option<ColumnCollapse>,
     /// Messages during the run.
     pub messages: Vec<String>,
     /// Warnings during the run.
@@ -50,33 +47,6 @@ pub struct Report {
     pub outputs: PathBuf,
     /// Picture of the last state.
     pub picture: Option<PathBuf>,
-}
-
-/// Final shape of a collapsed column, m, beside published laws.
-#[derive(Clone, Debug, Serialize, Deserialize)]
-pub struct ColumnCollapse {
-    /// Initial height over radius or half width.
-    pub aspect: f64,
-    /// Radius within which 98 % of the mass lies.
-    pub run_out: f64,
-    /// Outer edge of the connected deposit.
-    pub outer_edge: f64,
-    /// Height at the centre.
-    pub height: f64,
-    /// Run-out and height by authors.
-    pub laws: BTreeMap<String, [Option<f64>; 2]>,
-}
-
-impl From<&Collapse> for ColumnCollapse {
-    fn from(collapse: &Collapse) -> Self {
-        Self {
-            aspect: collapse.aspect,
-            run_out: collapse.front,
-            outer_edge: collapse.edge,
-            height: collapse.height,
-            laws: collapse.laws.iter().map(|law| (law.authors.to_owned(), [law.edge, law.height])).collect(),
-        }
-    }
 }
 
 /// The digest of a job as reports have it.

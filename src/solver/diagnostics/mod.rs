@@ -1,4 +1,5 @@
 //! Measurements of a state.
+mod deposit;
 pub mod given_boxes;
 pub mod lines;
 pub mod maps;

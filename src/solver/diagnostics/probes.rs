@@ -8,7 +8,7 @@ use crate::exact_sum::ExactSum;
 use crate::particle::Layout;
 use crate::particle::chunk::{Chunk, Tag};
 use crate::particle::volume::{cauchy_stress, measured_volume, reference_volume};
-use crate::probe::{Measured, Probe, Readings};
+use crate::probe::{Deposit, Measured, Probe, Readings};
 use crate::simd::{LANES, Lanes, Vector};
 use crate::solver::physics::Physics;
 use crate::solver::state::Solver;
@@ -57,7 +57,13 @@ impl<const D: usize> Solver<D> {
             });
             leaves.collect::<Vec<Option<Partial<D>>>>()
         });
-        reduced(&self.comm, partials)
+        let mut readings = reduced(&self.comm, partials);
+        for (probe, readings) in probes.iter().zip(&mut readings) {
+            if let Some(foot) = &probe.foot {
+                readings.deposit = self.read_deposit(probe, foot, readings.mass);
+            }
+        }
+        readings
     }
 }
 
@@ -97,6 +103,7 @@ fn readings<const D: usize>(of: impl Fn(usize) -> f64, greatest: &[f64]) -> Read
         volume_pores: of(18),
         greatest_speed: greatest[0].max(0.0).sqrt(),
         extent: [std::array::from_fn(|a| -greatest[1 + a]), std::array::from_fn(|a| greatest[1 + D + a])],
+        deposit: Deposit::NONE,
     }
 }
 
