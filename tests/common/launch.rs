@@ -201,8 +201,9 @@ pub(crate) fn text(output: &Output) -> String {
     )
 }
 
-/// Runs to the end, which must be a good one.
+/// Runs to the end, which must be a good one; several ranks in their turn.
 pub(crate) fn succeed(command: &mut Command) -> Output {
+    let _turn = mpirun::is_launch(command).then(mpirun::turn);
     let output = Running::start(command).finish();
     assert!(output.status.success(), "{command:?}\n{}", text(&output));
     output

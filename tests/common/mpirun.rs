@@ -2,7 +2,10 @@
 #![allow(dead_code, reason = "each test uses its part")]
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
-use std::sync::Mutex;
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+/// Ends a launch that hangs, s.
+const TIMEOUT: &str = "MPIEXEC_TIMEOUT";
 
 /// `jobs/environment`, which has the settings of `mpirun`.
 pub(crate) fn environment() -> PathBuf {
@@ -22,8 +25,13 @@ pub(crate) fn command(ranks: usize, seconds: u32) -> Command {
         .args(["-c", r#"source "$0" && exec mpirun --bind-to none "$@""#])
         .arg(environment())
         .args(["-n", &ranks.to_string()])
-        .env("MPIEXEC_TIMEOUT", seconds.to_string());
+        .env(TIMEOUT, seconds.to_string());
     command
+}
+
+/// Whether a command is one of [`command`].
+pub(crate) fn is_launch(command: &Command) -> bool {
+    command.get_program() == "bash" && command.get_envs().any(|(name, _)| name == TIMEOUT)
 }
 
 /// Whether `mpirun` is that of MPICH.
@@ -32,11 +40,16 @@ pub(crate) fn is_mpich() -> bool {
     text(&output).contains("HYDRA")
 }
 
-/// Runs a command of [`command`] to its end. One at a time in this process: more would only compete for the
-/// same cores.
+/// The turn of several ranks, of which one set runs at a time in this process: those of two share the cores,
+/// and wait for ranks that have none.
+pub(crate) fn turn() -> MutexGuard<'static, ()> {
+    static TURN: Mutex<()> = Mutex::new(());
+    TURN.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Runs a command of [`command`] to its end, in its turn.
 pub(crate) fn finish(command: &mut Command) -> Output {
-    static ONE_LAUNCH: Mutex<()> = Mutex::new(());
-    let _guard = ONE_LAUNCH.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
+    let _turn = turn();
     command.output().expect("bash starts")
 }
 
