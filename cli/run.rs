@@ -169,8 +169,7 @@ fn print(
         1 => writeln!(out, ", 1 warning")?,
         more => writeln!(out, ", {more} warnings")?,
     }
-    ended::hints(out, summary, results.directory, results.name, matches!(page, Some(Ok(_))))?;
-    Ok(())
+    ended::hints(out, summary, results.directory, results.name, matches!(page, Some(Ok(_))))
 }
 
 /// Collective. Starts the threads of this rank: as many as wanted, else as the variable of rayon says, else

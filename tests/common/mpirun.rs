@@ -31,7 +31,7 @@ pub(crate) fn command(ranks: usize, seconds: u32) -> Command {
 
 /// Whether a command is one of [`command`].
 pub(crate) fn is_launch(command: &Command) -> bool {
-    command.get_program() == "bash" && command.get_envs().any(|(name, _)| name == TIMEOUT)
+    command.get_envs().any(|(name, _)| name == TIMEOUT)
 }
 
 /// Whether `mpirun` is that of MPICH.

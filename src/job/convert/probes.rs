@@ -1,5 +1,6 @@
 //! Measurements of the job file to those of the program.
 use super::checks::{Checks, Space};
+use crate::geometry::written::Vector;
 use crate::job::parse::source::Path;
 use crate::job::schema::job_file::JobFile;
 use crate::job::schema::probes::{Flux as Written, Probe as WrittenProbe};
@@ -45,15 +46,7 @@ fn foot<const D: usize>(
     let needs = written.quantities.iter().position(|quantity| quantity.needs_foot());
     match (&written.foot, needs) {
         (None, None) => Some(None),
-        (Some(foot), Some(_)) => {
-            let foot: [f64; D] = checks.point(foot, space, &path.key("foot"))?;
-            if (0..D).all(|a| (0.0..=space.size[a]).contains(&foot[a])) {
-                return Some(Some(foot));
-            }
-            let message = format!("found {}; expected a point in the domain", space.words(&foot));
-            checks.fault(&path.key("foot"), message);
-            None
-        }
+        (Some(foot), Some(_)) => point_in_domain(checks, foot, space, &path.key("foot")).map(Some),
         (None, Some(k)) => {
             let message = "found a quantity of a deposit without its foot; expected foot = [...], the point on the ground \
                            below its middle";
@@ -67,6 +60,21 @@ fn foot<const D: usize>(
             None
         }
     }
+}
+
+/// A point of the domain, m from its lower corner, or a fault.
+fn point_in_domain<const D: usize>(
+    checks: &mut Checks,
+    written: &Vector,
+    space: &Space<D>,
+    path: &Path,
+) -> Option<[f64; D]> {
+    let point: [f64; D] = checks.point(written, space, path)?;
+    let is_inside = (0..D).all(|a| (0.0..=space.size[a]).contains(&point[a]));
+    if !is_inside {
+        checks.fault(path, format!("found {}; expected a point in the domain", space.words(&point)));
+    }
+    is_inside.then_some(point)
 }
 
 /// All tracks, or faults.
@@ -196,15 +204,8 @@ pub(super) fn lines<const D: usize>(
         let before = file.lines[..i].iter().map(|line| &*line.name);
         checks.column_name(&written.name, before, &here.key("name"));
         each_once(checks, &written.quantities, &here.key("quantities"));
-        let ends = [("from", &written.from), ("to", &written.to)].map(|(key, end)| {
-            let end: [f64; D] = checks.point(end, space, &here.key(key))?;
-            if (0..D).all(|a| (0.0..=space.size[a]).contains(&end[a])) {
-                return Some(end);
-            }
-            let message = format!("found {}; expected a point in the domain", space.words(&end));
-            checks.fault(&here.key(key), message);
-            None
-        });
+        let ends = [("from", &written.from), ("to", &written.to)]
+            .map(|(key, end)| point_in_domain::<D>(checks, end, space, &here.key(key)));
         let bodies = checks.bodies(written.bodies.as_deref(), &file.body_names(), &here.key("bodies"));
         if let ([Some(from), Some(to)], Some(bodies)) = (ends, bodies) {
             let last = f64::from(written.points - 1);

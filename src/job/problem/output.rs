@@ -1,4 +1,4 @@
-//! Settings of a job for time steps, output, checkpoints and reports.
+//! Settings of a job for time steps, output and checkpoints.
 use std::path::PathBuf;
 
 use crate::io::snapshot::PointField as Field;

@@ -2,7 +2,7 @@
 //!
 //! The comments here are the descriptions in the schema and in error messages, so each says its unit.
 pub use super::adaptivity::Adaptivity;
-pub use super::common::{AxisName, Spin};
+pub use super::common::Spin;
 use super::common::{two, yes};
 pub use super::conditions::boundaries::{Boundaries, Face, Leaving};
 pub use super::conditions::colliders::Collider;

@@ -30,12 +30,11 @@ impl<const D: usize> Solver<D> {
     pub(super) fn read_deposit(&self, probe: &Probe<D>, foot: &[f64; D], mass: f64) -> Deposit {
         let seen: Vec<Seen> = self.chunks.iter().flat_map(|chunk| self.seen(chunk, probe, foot)).collect();
         let reach = seen.iter().map(|seen| seen.distance + seen.half).fold(0.0, f64::max);
-        let mut reach = [reach];
-        self.comm.max_f64s(&mut reach);
-        if mass <= 0.0 || reach[0] <= 0.0 {
+        let reach = self.comm.max_f64(reach);
+        if mass <= 0.0 || reach <= 0.0 {
             return Deposit::NONE;
         }
-        let width = reach[0] / (PARTS - 1) as f64;
+        let width = reach / (PARTS - 1) as f64;
         let part = |distance: f64| ((distance.max(0.0) / width) as usize).min(PARTS - 1);
         let mut masses = vec![0_u64; PARTS];
         let mut covered = vec![0_u64; PARTS];
@@ -63,7 +62,7 @@ impl<const D: usize> Solver<D> {
         let height = tops[..=part(MIDDLE * run_out)].iter().copied().fold(f64::NEG_INFINITY, f64::max);
         Deposit {
             run_out,
-            edge: edge.map_or(reach[0], |gap| (front + gap) as f64 * width),
+            edge: edge.map_or(reach, |gap| (front + gap) as f64 * width),
             height: if height.is_finite() { height } else { f64::NAN },
         }
     }
