@@ -319,7 +319,8 @@ pub enum Sampling {
     Lattice,
     /// On the lattice, and where the surface of the body cuts a box of it, with the volume, the mass and the
     /// centroid of the part of the body in the box: the masses and the frequencies of curved bodies are
-    /// right. `particles_per_cell` is a multiple of 0.25.
+    /// right. In 2D such boxes have half the edge, but in sand and snow. `particles_per_cell` is a multiple
+    /// of 0.25.
     Fitted,
     /// At random, by at most 0.35 of their distance from the points of the lattice along each axis.
     Jittered,

@@ -3,8 +3,13 @@
 //! A box of the lattice that the surface of a body cuts gives a particle with the volume and the centroid of
 //! the part of the body in it. Parts below a tenth of a box join a neighbour in their leaf, volume and
 //! centroid kept, unless it has none. So the particles of a body have its volume and its centroid, whatever
-//! its surface. Bodies whose `sampling` is `fitted` have such particles. All follows from the body and the
-//! leaf alone.
+//! its surface. Bodies whose `sampling` is `fitted` have such particles.
+//!
+//! The box of a particle is a square, whatever the part that it stands for, so the rim of a body has gaps
+//! and overlaps as wide as the boxes there. In the plane, solids that keep their shape have boxes of half
+//! the edge along their surface: a quarter of the error of a ring that breathes, with 32 cells over it. In
+//! space a ball of 16 cells to its radius would have 1.6 times as many particles. All follows from the body
+//! and the leaf alone.
 use super::lattice::{lattice_of, spacing};
 use crate::geometry::{Aabb, Sampling, Shape, Side};
 use crate::job::problem::{Body, Problem};
@@ -17,6 +22,9 @@ const SMALL: f64 = 0.1;
 /// Greatest volume of a particle that others have joined, in boxes: its box stays less than a tenth wider.
 const MOST: f64 = 1.2;
 
+/// Distance of the centre of a box to the surface up to which it is cut, in edges: its mean extent over all
+/// directions of the surface in the plane.
+const CUT: f64 = 0.64;
 /// Distance of the centre of a box to the surface up to which more than [`SMALL`] of it is inside, in edges.
 const LIKELY: f64 = 0.4;
 
@@ -31,6 +39,8 @@ pub(super) struct Point<const D: usize> {
     pub(super) part: Option<Part<D>>,
     /// Places of parts that have joined this one.
     pub(super) joined: Vec<[u64; D]>,
+    /// Edges of the boxes at these places in one of the lattice.
+    pub(super) halves: u64,
 }
 
 /// Contents of a box.
@@ -44,7 +54,13 @@ pub(super) struct Part<const D: usize> {
 
 impl<const D: usize> Point<D> {
     pub(super) fn at(index: [u64; D], x: [f64; D]) -> Self {
-        Self { index, x, part: None, joined: Vec::new() }
+        Self { index, x, part: None, joined: Vec::new(), halves: 1 }
+    }
+
+    /// Places of all its boxes in a lattice of boxes with an edge `halves` times in that of the body's.
+    pub(super) fn places(&self, halves: u64) -> impl Iterator<Item = [u64; D]> {
+        let more = halves / self.halves;
+        std::iter::once(&self.index).chain(&self.joined).flat_map(move |index| children(*index, more))
     }
 }
 
@@ -54,6 +70,18 @@ impl<const D: usize> Point<D> {
 pub(super) fn has_parts<const D: usize>(problem: &Problem<D>, body: &Body<D>) -> bool {
     let material = &problem.materials[body.material];
     matches!(body.sampling, Sampling::Fitted) && !material.build().is_fluid()
+}
+
+/// Edges of the boxes along the surface of a body in one of its lattice.
+pub(super) fn halves_at_surface<const D: usize>(problem: &Problem<D>, body: &Body<D>) -> u64 {
+    let keeps_its_shape = || problem.materials[body.material].build().keeps_its_shape();
+    if D == 2 && has_parts(problem, body) && keeps_its_shape() { 2 } else { 1 }
+}
+
+/// Places of the boxes that a box is cut into, so many along each axis, in the order of their lattice.
+fn children<const D: usize>(index: [u64; D], halves: u64) -> impl Iterator<Item = [u64; D]> {
+    let place = move |k: u64, a: usize| k / halves.pow((D - 1 - a) as u32) % halves;
+    (0..halves.pow(D as u32)).map(move |k| std::array::from_fn(|a| index[a] * halves + place(k, a)))
 }
 
 /// Whether a body has a particle for a box of the lattice, its own or one that its part has joined.
@@ -69,15 +97,46 @@ pub(super) fn of_leaf<const D: usize>(
     level: u8,
 ) -> Vec<Point<D>> {
     let Some(spacing) = spacing_of_body(problem, body, level) else { return Vec::new() };
-    let mut points: Vec<Point<D>> = (lattice_of(cell, spacing).into_iter())
-        .filter_map(|index| {
-            let part = of_box(&body.shape, &index, spacing)?;
-            let x = index.map(|i| (i as f64 + 0.5) * spacing);
-            Some(Point { part, ..Point::at(index, x) })
-        })
-        .collect();
-    join(&mut points, (0..D).fold(1.0, |volume, _| volume * spacing));
+    let mut points = of_boxes(&body.shape, lattice_of(cell, spacing).into_iter(), spacing);
+    let is_cut: Vec<[u64; D]> =
+        points.iter().filter(|point| point.part.is_some()).map(|point| point.index).collect();
+    join(&mut points, volume::<D>(spacing));
+    let halves = halves_at_surface(problem, body);
+    if halves == 1 || is_cut.is_empty() {
+        return points;
+    }
+    let (cut, mut points): (Vec<_>, Vec<_>) =
+        points.into_iter().partition(|point| is_cut.binary_search(&point.index).is_ok());
+    let small = spacing / halves as f64;
+    let mut places: Vec<[u64; D]> = cut.iter().flat_map(|point| point.places(halves)).collect();
+    places.sort_unstable();
+    let mut parts = of_boxes(&body.shape, places.into_iter(), small);
+    join(&mut parts, volume::<D>(small));
+    points.extend(parts.into_iter().map(|point| {
+        let whole = Part { volume: volume::<D>(small), centre: point.x };
+        Point { part: point.part.or(Some(whole)), halves, ..point }
+    }));
+    points.sort_by_key(|point| point.places(halves).next());
     points
+}
+
+/// Volume of a box of this edge, m³ (m² in the plane).
+fn volume<const D: usize>(edge: f64) -> f64 {
+    (0..D).fold(1.0, |volume, _| volume * edge)
+}
+
+/// The parts of a shape in boxes of this edge, one at each of some places, all in the order of the lattice.
+fn of_boxes<const D: usize>(
+    shape: &Shape<D>,
+    places: impl Iterator<Item = [u64; D]>,
+    edge: f64,
+) -> Vec<Point<D>> {
+    let points = places.filter_map(|index| {
+        let part = of_box(shape, &index, edge)?;
+        let x = index.map(|i| (i as f64 + 0.5) * edge);
+        Some(Point { part, ..Point::at(index, x) })
+    });
+    points.collect()
 }
 
 /// About as many particles as [`of_leaf`] makes, without the cost of their volumes: those of boxes of which
@@ -89,11 +148,18 @@ pub(super) fn likely_of_leaf<const D: usize>(
     level: u8,
 ) -> Vec<Point<D>> {
     let Some(spacing) = spacing_of_body(problem, body, level) else { return Vec::new() };
-    let likely = lattice_of(cell, spacing).into_iter().filter_map(|index| {
-        let x = index.map(|i| (i as f64 + 0.5) * spacing);
-        let outside = Part { volume: 0.0, centre: x };
-        (body.shape.distance(&x) < LIKELY * spacing)
-            .then(|| Point { part: (!body.shape.contains(&x)).then_some(outside), ..Point::at(index, x) })
+    let halves = halves_at_surface(problem, body);
+    let centre = |index: &[u64; D], edge: f64| index.map(|i| (i as f64 + 0.5) * edge);
+    let likely = lattice_of(cell, spacing).into_iter().flat_map(|index| {
+        let is_cut = body.shape.distance(&centre(&index, spacing)).abs() < CUT * spacing;
+        let halves = if is_cut { halves } else { 1 };
+        let edge = spacing / halves as f64;
+        children(index, halves).filter_map(move |index| {
+            let x = centre(&index, edge);
+            let outside = Part { volume: 0.0, centre: x };
+            (body.shape.distance(&x) < LIKELY * edge)
+                .then(|| Point { part: (!body.shape.contains(&x)).then_some(outside), ..Point::at(index, x) })
+        })
     });
     let likely: Vec<Point<D>> = likely.collect();
     if likely.is_empty() { of_leaf(problem, body, cell, level) } else { likely }

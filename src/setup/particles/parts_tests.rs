@@ -136,8 +136,9 @@ fn small_parts_join_their_neighbours() {
     let (mut small, mut parts, mut joined) = (0, 0, 0);
     for leaf in leaves(&problem) {
         let points = of_leaf(&problem, &problem.bodies[0], &problem.octant_box(&leaf), leaf.level);
-        let whole = spacing(&problem, leaf.level, &problem.bodies[0]).powi(2);
+        let edge = spacing(&problem, leaf.level, &problem.bodies[0]);
         for point in &points {
+            let whole = (edge / point.halves as f64).powi(2);
             let volume = point.part.map_or(whole, |part| part.volume);
             assert!(volume < MOST * whole);
             small += u32::from(volume < SMALL * whole);
@@ -147,6 +148,44 @@ fn small_parts_join_their_neighbours() {
     }
     println!("{parts} parts, {joined} joined, {small} small");
     assert!(parts > 20 && joined > 3 && 10 * small <= parts);
+}
+
+/// In the plane a disc of rubber has boxes of half the edge along its rim, at the places of its lattice of
+/// them, and no others; one of sand has none. In space no body has.
+#[test]
+fn solids_in_the_plane_have_smaller_boxes_along_their_surface() {
+    let of_model = |model: &str| {
+        let text = format!(
+            "version = 1\ndimension = 2\ntime = {{ end = 1 }}\ndomain = {{ size = [2, 1], root_edge = 1 }}\ntree = {{ base_level = 1 }}\n\
+             [[materials]]\nname = \"m\"\ndensity = 1500\nyoung = 1e6\npoisson = 0.3\n{model}\n[[bodies]]\nname = \"disc\"\nmaterial = \"m\"\n\
+             sampling = \"fitted\"\nshape = {{ kind = \"circle\", centre = [1.03, 0.51], radius = 0.43 }}\n"
+        );
+        let any = parse(&text, "test.toml".as_ref()).unwrap_or_else(|faults| panic!("{faults:?}"));
+        let problem: Problem<2> = any.try_into().unwrap_or_else(|_| panic!("wrong dimension"));
+        let body = &problem.bodies[0];
+        let halves = halves_at_surface(&problem, body);
+        for leaf in leaves(&problem) {
+            let points = of_leaf(&problem, body, &problem.octant_box(&leaf), leaf.level);
+            let edge = spacing(&problem, leaf.level, body);
+            let mut all: Vec<[u64; 2]> = points.iter().flat_map(|point| point.places(halves)).collect();
+            for point in points {
+                // What is far from the rim has the boxes of the lattice.
+                let is_far = body.shape.distance(&point.x) < -1.1 * edge;
+                assert!(!is_far || point.halves == 1, "{:?}", point.x);
+                assert!(point.part.is_none() || !point.joined.is_empty() || point.halves == halves);
+            }
+            let number = all.len();
+            all.sort_unstable();
+            all.dedup();
+            assert_eq!(all.len(), number, "two particles at a place");
+        }
+        halves
+    };
+    assert_eq!(of_model("model = \"neo_hookean\""), 2);
+    assert_eq!(of_model("model = \"drucker_prager\"\nfriction_angle = 30"), 1);
+    let ball = "shape = { kind = \"sphere\", centre = [0.5, 0.5, 0.5], radius = 0.4 }";
+    let problem = problem::<3>("{ size = [1, 1, 1], root_edge = 1 }", "{ base_level = 0 }", &[ball]);
+    assert_eq!(halves_at_surface(&problem, &problem.bodies[0]), 1);
 }
 
 /// A box off the lattice by rounding alone has the particles of one on it, bit for bit.

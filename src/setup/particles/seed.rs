@@ -7,7 +7,7 @@
 //! Where the surface of a fitted body cuts the box of a point, the particle is the part of the body in it
 //! (`parts.rs`).
 use super::lattice::{coordinate, first_at_or_after, for_lattice, spacing};
-use super::parts::{Point, has_parts, likely_of_leaf, of_leaf};
+use super::parts::{Point, halves_at_surface, has_parts, likely_of_leaf, of_leaf};
 use crate::geometry::{Aabb, Sampling, Side};
 use crate::job::problem::{Body, Problem};
 use crate::load::Water;
@@ -194,7 +194,8 @@ fn place_near<const D: usize>(
     places.into_iter().find(fits).unwrap_or(*x)
 }
 
-/// A body, a place in its lattice, and the number of the particle there.
+/// A body, a place in its lattice, or in that of the boxes along its surface where they are smaller, and the
+/// number of the particle there.
 pub(super) type NumberedPlace<const D: usize> = ((u16, [u64; D]), usize);
 
 /// Not collective. Bodies and places in the lattice, each with the number of the particle there among those
@@ -209,9 +210,9 @@ pub(super) fn lattice_places<const D: usize>(
 ) -> Result<Vec<NumberedPlace<D>>, SeedError> {
     let (mut places, mut number) = (Vec::new(), 0);
     visit(problem, octant, problem.bodies_of_stage(stage), of_leaf, |body, points| {
+        let halves = halves_at_surface(problem, &problem.bodies[body]);
         for point in points {
-            let all = std::iter::once(&point.index).chain(&point.joined);
-            places.extend(all.map(|index| ((body as u16, *index), number)));
+            places.extend(point.places(halves).map(|index| ((body as u16, index), number)));
             number += 1;
         }
     })?;
