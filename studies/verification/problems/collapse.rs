@@ -1,4 +1,6 @@
 //! Problem 6: granular columns collapse, in a plane and round an axis.
+use agimp::exact_sum::ExactSum;
+
 use crate::page::Page;
 use crate::plot::{Chart, Series};
 use crate::runs::{Results, Runs};
@@ -8,6 +10,9 @@ const GRAVITY: f64 = 9.81;
 const FRONT_SHARE: f64 = 0.98;
 /// Height over radius of the highest of the low columns, whose run-out is proportional to it.
 const LOW: f64 = 1.5;
+/// Cells of half the size where the sand shears: "AMR to R/32 at the front" of the problem set.
+const FRONT: &str = "adaptivity={ every_steps = 20, \
+     criteria = [{ kind = \"plastic_strain_rate\", level = 3, refine = 2, coarsen = 0.5 }] }";
 
 /// Heads of a table of deposits.
 const HEADS: [&str; 7] = [
@@ -41,6 +46,8 @@ pub(crate) struct Columns {
     aspects: &'static [f64],
     /// Halvings of the cells for columns up to 1.5: less of these slides.
     low: i32,
+    /// Whether columns up to 1.5 have cells of half the size where they shear.
+    front: bool,
     /// Time after which the material rests over `sqrt(height / g)`.
     rest: f64,
 }
@@ -54,6 +61,7 @@ pub(crate) const PLANAR: Columns = Columns {
     level: 2,
     aspects: &[0.5, 1.0, 1.5, 4.0, 6.0, 8.0],
     low: 1,
+    front: false,
     rest: 3.3,
 };
 
@@ -66,6 +74,7 @@ const SPACE: Columns = Columns {
     level: 2,
     aspects: &[0.55, 0.9, 1.25, 2.75, 4.0],
     low: 0,
+    front: true,
     rest: 3.0,
 };
 
@@ -113,6 +122,11 @@ impl Columns {
         if aspect <= LOW { self.low } else { 0 }
     }
 
+    /// Settings for a column of this height over radius.
+    fn settings(&self, aspect: f64) -> Vec<String> {
+        if self.front && aspect <= LOW { vec![FRONT.to_owned()] } else { vec![] }
+    }
+
     /// Runs a column with cells of `radius / 16 * 2^-finer`.
     pub(crate) fn collapse(&self, runs: &Runs, aspect: f64, finer: i32, more: &[String]) -> Deposit {
         self.collapse_as(runs, aspect, finer, more, &more.len().to_string())
@@ -153,7 +167,11 @@ impl Columns {
         let halves = results.particles(last, "half_width", 1);
         let near = near.zip(halves).filter(|(x, _)| self.distance(x) < 2.0 * cell);
         let top = near.map(|(x, half)| x[self.dimension - 1] + half[0]).fold(0.0, f64::max);
-        let mass = |number| results.particles(number, "mass", 1).iter().map(|m| m[0]).sum::<f64>();
+        let mass = |number| {
+            let mut sum = ExactSum::new();
+            results.particles(number, "mass", 1).iter().for_each(|m| sum.add(m[0]));
+            sum.to_f64()
+        };
         Deposit {
             runout: runouts[last] / radius,
             height: top / radius,
@@ -186,11 +204,16 @@ impl Columns {
     }
 
     /// A row of the table of deposits.
-    fn row(&self, cells: &str, aspect: f64, deposit: &Deposit) -> Vec<String> {
+    fn row(&self, halvings: i32, front: bool, aspect: f64, deposit: &Deposit) -> Vec<String> {
         let [runout, height] = self.law(aspect);
+        let cells = |halvings: i32| format!("1/{}", 1 << (4 + halvings));
         vec![
             self.name.to_owned(),
-            cells.to_owned(),
+            if front {
+                format!("{}, {} where it shears", cells(halvings), cells(halvings + 1))
+            } else {
+                cells(halvings)
+            },
             format!("{aspect}"),
             format!("{:.3} ({runout:.3})", deposit.runout),
             format!("{:.3} ({height:.3})", deposit.height),
@@ -204,7 +227,8 @@ impl Columns {
         let (mut late, mut lost): (f64, f64) = (0.0, 0.0);
         let mut found: Vec<[f64; 2]> = Vec::new();
         for &aspect in self.aspects {
-            let deposit = self.collapse(runs, aspect, self.halvings(aspect), &[]);
+            let (halvings, settings) = (self.halvings(aspect), self.settings(aspect));
+            let deposit = self.collapse(runs, aspect, halvings, &settings);
             let [runout, height] = self.law(aspect);
             let (name, ratio) = (self.name, deposit.runout / runout);
             page.line(&format!("collapse.{name}.runout.{aspect}"), ratio);
@@ -213,7 +237,7 @@ impl Columns {
             late = if (time - 1.0).abs() > (late - 1.0).abs() || late == 0.0 { time } else { late };
             lost = lost.max(deposit.mass);
             found.push([aspect, deposit.runout]);
-            rows.push(self.row(cells(self.halvings(aspect)), aspect, &deposit));
+            rows.push(self.row(halvings, !settings.is_empty(), aspect, &deposit));
         }
         page.line(&format!("collapse.{}.time", self.name), late);
         page.line(&format!("collapse.{}.mass", self.name), lost);
@@ -237,15 +261,15 @@ impl Columns {
             slope(found.iter().filter(|p| p[0] >= tall_from).collect()),
         );
         for aspect in [1.0, 4.0, 1.25].into_iter().filter(|aspect| self.aspects.contains(aspect)) {
-            // In space with twice the cells: half of them would take an hour.
-            let halvings = self.halvings(aspect) + if self.dimension == 2 { 1 } else { -1 };
             if self.dimension == 3 && aspect == 4.0 {
                 continue;
             }
+            // In space without the cells of half the size: all of half the size would take hours.
+            let halvings = self.halvings(aspect) + i32::from(self.dimension == 2);
             let other = self.collapse(runs, aspect, halvings, &[]);
             let change = other.runout / runout_of(&found, aspect) - 1.0;
             page.line(&format!("collapse.{}.cells.{aspect}", self.name), change.abs());
-            rows.push(self.row(cells(halvings), aspect, &other));
+            rows.push(self.row(halvings, false, aspect, &other));
         }
         if self.dimension == 3 {
             rows.extend(rings(runs, page, &found));
@@ -278,27 +302,19 @@ fn runout_of(found: &[[f64; 2]], aspect: f64) -> f64 {
     found.iter().find(|point| point[0] == aspect).map_or(f64::NAN, |point| point[1])
 }
 
-/// Words for cells of `radius / 16 * 2^-halvings`.
-fn cells(halvings: i32) -> &'static str {
-    match halvings {
-        -1 => "1/8",
-        0 => "1/16",
-        1 => "1/32",
-        _ => "1/64",
-    }
-}
-
 /// Low columns as bodies of revolution, which have cells of half the size in seconds; `space` has height over
 /// radius and run-out of those in space.
 fn rings(runs: &Runs, page: &mut Page, space: &[[f64; 2]]) -> Vec<Vec<String>> {
     let mut rows = Vec::new();
     let (mut off, mut change): (f64, f64) = (0.0, 0.0);
     for &aspect in RINGS.aspects {
+        let same = RINGS.collapse(runs, aspect, 0, &RINGS.settings(aspect));
+        off = off.max((runout_of(space, aspect) / same.runout - 1.0).abs());
+        rows.push(RINGS.row(0, true, aspect, &same));
         let [coarse, fine] = [0, 1].map(|finer| RINGS.collapse(runs, aspect, finer, &[]));
-        off = off.max((runout_of(space, aspect) / coarse.runout - 1.0).abs());
         change = change.max((fine.runout / coarse.runout - 1.0).abs());
         rows.extend(
-            [(0, coarse), (1, fine)].map(|(finer, deposit)| RINGS.row(cells(finer), aspect, &deposit)),
+            [(0, coarse), (1, fine)].map(|(finer, deposit)| RINGS.row(finer, false, aspect, &deposit)),
         );
     }
     page.line("collapse.rings.space", off);
@@ -333,7 +349,7 @@ pub(crate) fn section(runs: &Runs, page: &mut Page) {
         "## 6 Granular columns\n\n\
          Columns of dry sand (Drucker-Prager, 29.5 degrees matched in the plane, no dilation, floor with tan 29.5 degrees) collapse: [planar](../jobs/verification/collapse_planar.toml) (half width 19.5 mm) and \
          [axisymmetric](../jobs/verification/collapse_axisymmetric.toml) (a quarter in space, radius 100 mm; low ones [as bodies of revolution](../jobs/verification/collapse_rings.toml) as well), on cells of a sixteenth of these, \
-         low planar ones of a 32nd, with FLIP. Run-out beyond the first edge: 98 % of the connected mass lies within. Laws of measurements: Lube et al. (2004, 2005), heights of low cylinders \
+         low planar ones of a 32nd, low cylinders of a 32nd where they shear (criterion `plastic_strain_rate`, 2/s), with FLIP. Run-out beyond the first edge: 98 % of the connected mass lies within. Laws of measurements: Lube et al. (2004, 2005), heights of low cylinders \
          Lajeunesse et al. (2004). E = 1 MPa, a tenth of that of Fern and Soga (2016), for longer steps. The planar experiments had side walls, which slow the sand. Exercises plasticity with an apex, friction at the floor, large flow and long times.\n",
     );
     PLANAR.section(runs, page, 4.0);
