@@ -11,8 +11,8 @@ use partition::comm::{Comm, Disagreement};
 use rayon::prelude::*;
 use rustc_hash::FxHashMap;
 
-use super::lattice::{lattice_of, spacing};
-use super::parts::{halves_at_surface, has_parts, is_in_box};
+use super::lattice::{coordinate, lattice_of};
+use super::parts::{edge_at_surface, has_parts, is_in_box};
 use super::seed::{NumberedPlace, SeedError, lattice_places};
 use crate::exact_sum::ExactSum;
 use crate::geometry::surface::{Patch, Region, patches};
@@ -20,7 +20,6 @@ use crate::geometry::{Aabb, Side};
 use crate::grid::KnownTree;
 use crate::grid::leaf_geometry::position_key;
 use crate::job::Problem;
-use crate::job::problem::Body;
 use crate::load::{Carried, CarriedForce, Load};
 use crate::particle::chunk::{Chunk, Layout, Tag};
 use crate::particle::volume::reference_volume;
@@ -116,7 +115,7 @@ fn surface_shares<const D: usize>(
     let shares = tree.leaves().par_iter().map(|leaf| {
         let mut shares = Vec::new();
         for &body in &bodies {
-            let spacing = edge(problem, leaf.level, &problem.bodies[body]);
+            let spacing = edge_at_surface(problem, leaf.level, &problem.bodies[body]);
             if !is_near(problem, load, body, &problem.octant_box(leaf), spacing) {
                 continue;
             }
@@ -131,11 +130,6 @@ fn surface_shares<const D: usize>(
         shares
     });
     shares.collect::<Vec<_>>().into_iter().flatten().collect()
-}
-
-/// Edge of the boxes along the surface of a body in leaves of a level, m.
-fn edge<const D: usize>(problem: &Problem<D>, level: u8, body: &Body<D>) -> f64 {
-    spacing(problem, level, body) / halves_at_surface(problem, body) as f64
 }
 
 /// Whether surface of a body that a load acts on may lie in a box or on its faces.
@@ -223,9 +217,9 @@ impl<const D: usize> Search<'_, D> {
             self.tree.locate(key)
         };
         let level = self.tree.leaves()[leaf_of(x)?].level;
-        let spacing = edge(self.problem, level, &bodies[self.body]);
+        let spacing = edge_at_surface(self.problem, level, &bodies[self.body]);
         let index = x.map(|c| (c / spacing) as u64);
-        let centre = index.map(|i| (i as f64 + 0.5) * spacing);
+        let centre = index.map(|i| coordinate(i, spacing));
         let leaf = leaf_of(&centre).filter(|&leaf| self.tree.leaves()[leaf].level == level)?;
         let body = &bodies[self.body];
         if has_parts(self.problem, body) {

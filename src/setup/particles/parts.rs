@@ -10,7 +10,7 @@
 //! the edge along their surface: a quarter of the error of a ring that breathes, with 32 cells over it. In
 //! space a ball of 16 cells to its radius would have 1.6 times as many particles. All follows from the body
 //! and the leaf alone.
-use super::lattice::{lattice_of, spacing};
+use super::lattice::{coordinate, lattice_of, spacing};
 use crate::geometry::{Aabb, Sampling, Shape, Side};
 use crate::job::problem::{Body, Problem};
 
@@ -78,6 +78,11 @@ pub(super) fn halves_at_surface<const D: usize>(problem: &Problem<D>, body: &Bod
     if D == 2 && has_parts(problem, body) && keeps_its_shape() { 2 } else { 1 }
 }
 
+/// Edge of the boxes along the surface of a body in leaves of a level, m.
+pub(super) fn edge_at_surface<const D: usize>(problem: &Problem<D>, level: u8, body: &Body<D>) -> f64 {
+    spacing(problem, level, body) / halves_at_surface(problem, body) as f64
+}
+
 /// Places of the boxes that a box is cut into, so many along each axis, in the order of their lattice.
 fn children<const D: usize>(index: [u64; D], halves: u64) -> impl Iterator<Item = [u64; D]> {
     let place = move |k: u64, a: usize| k / halves.pow((D - 1 - a) as u32) % halves;
@@ -98,15 +103,15 @@ pub(super) fn of_leaf<const D: usize>(
 ) -> Vec<Point<D>> {
     let Some(spacing) = spacing_of_body(problem, body, level) else { return Vec::new() };
     let mut points = of_boxes(&body.shape, lattice_of(cell, spacing).into_iter(), spacing);
-    let is_cut: Vec<[u64; D]> =
+    let cut: Vec<[u64; D]> =
         points.iter().filter(|point| point.part.is_some()).map(|point| point.index).collect();
     join(&mut points, volume::<D>(spacing));
     let halves = halves_at_surface(problem, body);
-    if halves == 1 || is_cut.is_empty() {
+    if halves == 1 || cut.is_empty() {
         return points;
     }
     let (cut, mut points): (Vec<_>, Vec<_>) =
-        points.into_iter().partition(|point| is_cut.binary_search(&point.index).is_ok());
+        points.into_iter().partition(|point| cut.binary_search(&point.index).is_ok());
     let small = spacing / halves as f64;
     let mut places: Vec<[u64; D]> = cut.iter().flat_map(|point| point.places(halves)).collect();
     places.sort_unstable();
@@ -133,7 +138,7 @@ fn of_boxes<const D: usize>(
 ) -> Vec<Point<D>> {
     let points = places.filter_map(|index| {
         let part = of_box(shape, &index, edge)?;
-        let x = index.map(|i| (i as f64 + 0.5) * edge);
+        let x = index.map(|i| coordinate(i, edge));
         Some(Point { part, ..Point::at(index, x) })
     });
     points.collect()
@@ -149,13 +154,12 @@ pub(super) fn likely_of_leaf<const D: usize>(
 ) -> Vec<Point<D>> {
     let Some(spacing) = spacing_of_body(problem, body, level) else { return Vec::new() };
     let halves = halves_at_surface(problem, body);
-    let centre = |index: &[u64; D], edge: f64| index.map(|i| (i as f64 + 0.5) * edge);
     let likely = lattice_of(cell, spacing).into_iter().flat_map(|index| {
-        let is_cut = body.shape.distance(&centre(&index, spacing)).abs() < CUT * spacing;
-        let halves = if is_cut { halves } else { 1 };
+        let distance = || body.shape.distance(&index.map(|i| coordinate(i, spacing)));
+        let halves = if halves > 1 && distance().abs() < CUT * spacing { halves } else { 1 };
         let edge = spacing / halves as f64;
         children(index, halves).filter_map(move |index| {
-            let x = centre(&index, edge);
+            let x = index.map(|i| coordinate(i, edge));
             let outside = Part { volume: 0.0, centre: x };
             (body.shape.distance(&x) < LIKELY * edge)
                 .then(|| Point { part: (!body.shape.contains(&x)).then_some(outside), ..Point::at(index, x) })
