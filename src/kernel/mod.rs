@@ -240,6 +240,8 @@ pub struct Scheme<'a> {
     /// Number of carried columns that are shares of a whole, which add up in a merge; those behind are
     /// values, which average.
     pub shares: usize,
+    /// First carried column of the displacement, if particles carry it.
+    pub displacement: Option<usize>,
     /// Greatest ratio of a half width to that of the undeformed whole, for boxes of elastic materials that
     /// keep their volume. Not less than that of others: these particles are halved before their boxes are
     /// wider than a cell.
@@ -276,6 +278,7 @@ impl<'a> Scheme<'a> {
             f_bar: false,
             viscosity: None,
             shares: 0,
+            displacement: None,
             elastic_stretch: boxes.greatest_stretch(),
             has_halves: false,
             forces: false,

@@ -327,6 +327,7 @@ impl<const D: usize> Physics<D> {
             self.cohesion.as_ref().map_or(scheme.elastic_stretch, |cohesion| cohesion.stretch);
         let (f_bar, shares, has_halves) = (self.f_bar, self.load_columns(), self.has_halves);
         let (coordinates, viscosity) = (self.coordinates, self.viscosity);
-        Scheme { coordinates, f_bar, viscosity, shares, elastic_stretch, has_halves, ..scheme }
+        let displacement = self.followed_columns().displacement;
+        Scheme { coordinates, f_bar, viscosity, shares, displacement, elastic_stretch, has_halves, ..scheme }
     }
 }

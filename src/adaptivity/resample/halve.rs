@@ -10,14 +10,13 @@
 //! on a slant would move across. Its tag says so (see [`crate::particle::halvings`]). Mass, momentum and
 //! angular momentum are kept as [`pair::part`] says.
 use super::mixture::{Group, mixtures};
+use super::split::displacement::{hand_displacement, stretched};
 use super::split::moments::spread_on_lattice;
 use super::split::pair;
 use super::{Limits, Merged, Setting, ids, merge_backoff};
 use crate::kernel::Scheme;
-use crate::material::eigen::decompose;
 use crate::particle::chunk::{Chunk, Layout, Tag};
-use crate::particle::{halvings, volume};
-use crate::simd::{Lanes, Vector};
+use crate::particle::halvings;
 
 /// Width of a box, in cells of its leaf, from which on it is halved; measured, see
 /// `docs/design/resampling.md`.
@@ -84,14 +83,12 @@ fn wide_axis<const D: usize>(chunk: &Chunk<D>, setting: &Setting<D>, p: usize) -
     axis
 }
 
-/// Replaces elastic particles that have become too wide by two each, in their place. `displacement` is the
-/// first column of what particles carry of it. `book` gets the kinetic energy that each split adds, J.
-/// Returns how many were replaced, and how many stayed since their identifiers have no room for another
-/// generation.
+/// Replaces elastic particles that have become too wide by two each, in their place. `book` gets the
+/// kinetic energy that each split adds, J. Returns how many were replaced, and how many stayed since their
+/// identifiers have no room for another generation.
 pub(crate) fn halve<const D: usize>(
     chunk: &mut Chunk<D>,
     setting: &Setting<D>,
-    displacement: Option<usize>,
     book: &mut impl FnMut(f64),
 ) -> super::Split {
     let mut report = super::Split::default();
@@ -116,41 +113,14 @@ pub(crate) fn halve<const D: usize>(
         middle[axis] = 0.5 * undeformed::<D>(chunk, first)[axis];
         let offset = stretched(chunk, first, &middle, |stretch| stretch);
         book(pair::part(chunk, setting, first, &offset, &spread));
-        let grown = grown(chunk, first, &x);
+        hand_displacement(chunk, setting, first..first + 2, &x);
         for p in [first, first + 1] {
             let tag = merge_backoff::plain(chunk.tags()[p]);
             let split = ids::generation(chunk.ids()[p]) - 1;
             chunk.tags_mut()[p] = halvings::halved(tag, axis, split);
-            let side = if p == first { -1.0 } else { 1.0 };
-            if let Some(column) = displacement.filter(|first| chunk.carried_columns() >= first + D) {
-                (0..D).for_each(|a| chunk.carried_mut(column + a)[p] += side * grown[a]);
-            }
         }
     }
     report
-}
-
-/// By how much the way of the upper half from the whole, which was at `x`, has grown since the body was
-/// undeformed: `o - V⁻¹ o` with the left stretch V and the offset o, m. What the body has turned is not
-/// known.
-fn grown<const D: usize>(chunk: &Chunk<D>, first: usize, x: &[f64; D]) -> [f64; D] {
-    let upper = chunk.position(first + 1);
-    let offset = std::array::from_fn(|a| upper[a] - x[a]);
-    let before = stretched(chunk, first, &offset, f64::recip);
-    std::array::from_fn(|a| offset[a] - before[a])
-}
-
-/// `f(V) d` with the left stretch V of a particle.
-fn stretched<const D: usize>(chunk: &Chunk<D>, p: usize, d: &[f64; D], f: impl Fn(f64) -> f64) -> [f64; D] {
-    let [xx, yy, zz, xy, yz, xz] = volume::symmetric(chunk, Layout::<D>::LEFT_CAUCHY_GREEN, p);
-    let axes = decompose(&[xx, yy, zz, xy, xz, yz].map(Lanes::splat), D == 2);
-    let mut image = [0.0; D];
-    for (value, vector) in axes.value.iter().zip(&axes.vector) {
-        let direction: [f64; D] = std::array::from_fn(|a| vector[a].to_array()[0]);
-        let along = (0..D).map(|a| direction[a] * d[a]).sum::<f64>() * f(value.to_array()[0].sqrt());
-        (0..D).for_each(|a| image[a] = along.mul_add(direction[a], image[a]));
-    }
-    image
 }
 
 /// Makes one again of halves that are in one chunk and no longer stretched, where their states are alike.

@@ -54,7 +54,7 @@ impl<const D: usize> Solver<D> {
         let (start, phases) = (Instant::now(), self.phases);
         let scheme = self.physics.scheme();
         let (extent, root_edge) = (self.grid.plan.extent(), self.physics.root_edge);
-        let (nominal, displacement) = (&cohesion.nominal[..], self.physics.followed_columns().displacement);
+        let nominal = &cohesion.nominal[..];
         let leaves = self.chunks.par_iter_mut().zip(self.forest.leaves()).zip(&self.leaf_data.maxima);
         let done = leaves.with_min_len(16).map(|((chunk, leaf), maxima)| {
             let setting =
@@ -63,7 +63,7 @@ impl<const D: usize> Solver<D> {
             let cell = root_edge / f64::from(4_u32 << leaf.level);
             if halves && may_be_wide(maxima.elastic_width, cell) {
                 let energies = &mut splits.energies;
-                let report = halve::halve(chunk, &setting, displacement, &mut |e| energies.push(e));
+                let report = halve::halve(chunk, &setting, &mut |e| energies.push(e));
                 (splits.split, splits.refused) = (report.split, report.refused);
             }
             let mut energies = Vec::new();

@@ -7,6 +7,7 @@
 //! that axis. Mass and momentum are conserved as in [`super::split()`], and angular momentum since both take
 //! `B - C (o ⊗ o)` with the offset o. Particles whose space has grown in volume are left alone: separated
 //! grains (tension cut-off, spray) are no flow.
+use super::displacement::hand_displacement;
 use super::{pair, rings};
 use crate::adaptivity::resample::{Setting, ids};
 use crate::material::tensor::eigen::{decompose, determinant};
@@ -94,7 +95,9 @@ pub(crate) fn close_gaps<const D: usize>(
         let (spread, half) = (spread(chunk, first), half_width(chunk, setting, first, gap.column));
         let stretch = halved::<D>(&strain::read(chunk, gap.column, first), axis / half, &direction);
         let offset = direction.map(|component: f64| 0.5 * axis * component);
+        let x = chunk.position(first);
         book(pair::part(chunk, setting, first, &offset, &spread));
+        hand_displacement(chunk, setting, first..first + 2, &x);
         for p in [first, first + 1] {
             strain::write(chunk, gap.column, p, &stretch);
         }

@@ -7,9 +7,11 @@
 //! | `drift` | two of each that has drifted apart from its neighbours |
 //! | `rings` | the same in axisymmetry |
 //! | `child` | identifier, level and shares of a part |
+//! | `displacement` | displacements of parts |
 //! | `moments` | second moments of weights, for the affine matrix |
 //! | `offsets` | places on both sides of a number, to the last bit |
 mod child;
+pub(super) mod displacement;
 mod drift;
 pub(super) mod moments;
 mod offsets;

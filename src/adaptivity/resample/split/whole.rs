@@ -1,5 +1,6 @@
 //! One particle becomes `2^D`.
 use super::child::{hand_share, make_child};
+use super::displacement::hand_displacement;
 use super::offsets::{opposite, sides};
 use super::rings;
 use crate::adaptivity::resample::affine::{gradient, read_matrix, write_matrix};
@@ -58,7 +59,9 @@ pub fn split<const D: usize>(
     *chunk = chunk.gathered(&source);
     let divide = if setting.has_rings() { rings::divide::<D> } else { divide::<D> };
     for (first, place) in families {
+        let x = chunk.position(first);
         book(divide(chunk, setting, first, &territories[place], &spreads[place]));
+        hand_displacement(chunk, setting, first..first + (1 << D), &x);
     }
     report
 }

@@ -101,6 +101,32 @@ fn assert_admissible<const D: usize>(chunk: &Chunk<D>, p: usize) {
     assert!(material::eigen::determinant(&elastic(chunk, p).map(Lanes::splat)).to_array()[0] > 0.0);
 }
 
+/// Children of a particle that has been stretched know where in the undeformed body they come from.
+fn children_come_from_their_places<const D: usize>() {
+    let materials = materials();
+    let scheme = Scheme { displacement: Some(0), ..scheme(&materials, Transfer::Apic) };
+    let mut chunk = particles::<D>(3, 1, 1, Some(0));
+    let stretches = [1.4, 0.8, if D == 2 { 1.0 } else { 1.1 }];
+    chunk.carry(D);
+    for p in 0..chunk.len() {
+        let [xx, yy, zz] = stretches.map(|stretch| stretch * stretch);
+        set_matter(&mut chunk, p, [xx, yy, zz, 0.0, 0.0, 0.0], [0.0; HISTORIES]);
+        (0..D).for_each(|a| chunk.carried_mut(a)[p] = 0.01 * a as f64);
+    }
+    let original = chunk.clone();
+    split_all(&mut chunk, &setting(&scheme, 2));
+    let start = |chunk: &Chunk<D>, p: usize, a: usize| chunk.position(p)[a] - chunk.carried(a)[p];
+    for p in 0..chunk.len() {
+        let whole = p >> D;
+        let [half] = original.read(Layout::<D>::HALF, whole);
+        for a in 0..D {
+            let side: f64 = if p >> a & 1 == 1 { 0.5 } else { -0.5 };
+            let due = side.mul_add(half, start(&original, whole, a));
+            assert!((start(&chunk, p, a) - due).abs() < 1e-14, "particle {p}, axis {a}");
+        }
+    }
+}
+
 /// Drawn out along some line to three times their width while they get thinner, particles become two, and
 /// these again two where the line is not yet filled.
 fn closing_gaps_conserves<const D: usize>(seed: u64) {
@@ -177,6 +203,12 @@ proptest! {
         merging_strangers_conserves::<2>(seed);
         merging_strangers_conserves::<3>(seed);
     }
+}
+
+#[test]
+fn displacements_of_children() {
+    children_come_from_their_places::<2>();
+    children_come_from_their_places::<3>();
 }
 
 #[test]

@@ -25,13 +25,14 @@ fn drawn<const D: usize>(seed: u64, axis: usize, stretch: f64) -> Chunk<D> {
 /// whatever the transfer.
 fn halving_conserves<const D: usize>(seed: u64, transfer: Transfer) {
     let materials = materials();
-    let scheme = Scheme { shares: 1, has_halves: true, ..scheme(&materials, transfer) };
+    let scheme =
+        Scheme { shares: 1, displacement: Some(1), has_halves: true, ..scheme(&materials, transfer) };
     let axis = seed as usize % D;
     let mut chunk = drawn::<D>(seed, axis, 1.5);
     let original = chunk.clone();
     let setting = setting::<D>(&scheme, 1);
     let (before, mut energy) = (totals(&chunk), 0.0);
-    let report = halve(&mut chunk, &setting, Some(1), &mut |e| energy += e);
+    let report = halve(&mut chunk, &setting, &mut |e| energy += e);
     let number = original.len();
     assert_eq!((report.split, report.refused, chunk.len()), (number as u64, 0, 2 * number));
     let after = totals(&chunk);
@@ -75,7 +76,7 @@ fn halving_conserves<const D: usize>(seed: u64, transfer: Transfer) {
         }
     }
     // They are no longer too wide.
-    assert_eq!(halve(&mut chunk, &setting, Some(1), &mut |_| ()).split, 0);
+    assert_eq!(halve(&mut chunk, &setting, &mut |_| ()).split, 0);
     assert_eq!(rejoin(&mut chunk, &setting, &OPEN, &mut |_| ()).merged, 0, "and still too wide to be one");
     // Once they have the old length, they are one again, with all that they had.
     for p in 0..chunk.len() {
@@ -122,7 +123,7 @@ fn only_what_is_drawn_is_halved() {
     let scheme = Scheme { has_halves: true, ..scheme(&materials, Transfer::Apic) };
     let setting = setting::<2>(&scheme, 1);
     let halved = |chunk: &mut Chunk<2>| {
-        let report = halve(chunk, &setting, None, &mut |_| ());
+        let report = halve(chunk, &setting, &mut |_| ());
         (report.split, report.refused)
     };
     let chunk = drawn::<2>(5, 0, 1.5);
