@@ -71,6 +71,11 @@ impl<const D: usize> Adaptivity<D> {
         f64::from(1u32 << self.finest_level()) / root_edge
     }
 
+    /// Whether the tree follows criteria; else particles alone follow the tree.
+    pub fn is_refining(&self) -> bool {
+        !self.criteria.is_empty()
+    }
+
     /// Data found for the criteria alone.
     pub(crate) fn needs(&self) -> Needs {
         let each = self.criteria.iter().map(|criterion| criterion.indicator.needs());

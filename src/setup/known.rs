@@ -9,6 +9,7 @@ use super::estimate::pace::Pace;
 use super::estimate::{Estimate, EstimateError, LevelCount, estimate, tree_memory};
 use super::particles::seed::{SeedError, check_counts};
 use super::warnings::warnings;
+use crate::adaptivity::Adaptivity;
 use crate::job::{AnyProblem, Problem};
 use crate::particle::chunk::Tag;
 use crate::solver::state::bookings::CarriedTotals;
@@ -80,7 +81,8 @@ fn known_of<const D: usize>(
         (0..problem.stages.len()).try_for_each(|stage| check_counts(problem, &estimate.particles, stage))?;
     }
     let carries = problem.loads.iter().any(|load| load.carried().is_some());
-    let needs_particles = problem.adaptivity.is_some() || problem.seepage.is_some() || carries;
+    let is_refined = problem.adaptivity.as_ref().is_some_and(Adaptivity::is_refining);
+    let needs_particles = is_refined || problem.seepage.is_some() || carries;
     let is_moderate = !estimate.is_cut && estimate.memory < MOST_MEMORY;
     // MPI takes a moment to start, and jobs of about a second need no measurement.
     let is_short = estimate.wall_time(1) + SHORTEST_STEP * estimate.steps < SHORT;

@@ -18,8 +18,12 @@ impl<const D: usize> Solver<D> {
         if physics.equilibrium.is_some() {
             equilibrium.relaxation.save(saved);
         }
-        if physics.adaptivity.is_some() {
-            adaptation.ledger.save(saved);
+        if let Some(adaptivity) = &physics.adaptivity {
+            match adaptivity.is_refining() {
+                true => adaptation.ledger.save(saved),
+                // Earlier programs left particles as they were.
+                false => saved.if_there(|saved| adaptation.ledger.save(saved)),
+            }
         } else if !physics.sources.is_empty() {
             adaptation.ledger.save_next_root(saved);
         }

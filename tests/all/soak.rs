@@ -187,12 +187,13 @@ where
     let mut work: f64 = 0.0;
     for step in 1..=steps {
         solver.step(1e3, Requests::default()).map_err(|error| format!("step {step}: {error}"))?;
+        solver.regrid().map_err(|error| format!("step {step}: {error}"))?;
         if step % 10 != 0 {
             continue;
         }
         let totals = solver.particle_totals();
-        if totals.count != start.count {
-            return Err(format!("step {step}: {} of {} particles are left", totals.count, start.count));
+        if (totals.mass - start.mass).abs() > 1e-12 * start.mass {
+            return Err(format!("step {step}: {} of {} kg are left", totals.mass, start.mass));
         }
         if let Some(plate) = solver.reactions().first() {
             let elapsed = solver.clock.time - solver.contacts.sums.since;

@@ -33,6 +33,7 @@ pub struct Resampling<'a, const D: usize> {
     nominal: &'a [f64],
     stretch: Option<f64>,
     gap: Option<Gap>,
+    solid_strangers: bool,
 }
 
 impl<'a, const D: usize> Resampling<'a, D> {
@@ -46,12 +47,14 @@ impl<'a, const D: usize> Resampling<'a, D> {
         let (nominal, stretch) = (&adaptivity.nominal[..], adaptivity.split_stretch);
         // The stretch of neighbours' distances follows the columns carried for loads.
         let gap = adaptivity.split_gap.map(|cells| Gap { cells, column: scheme.shares });
-        Some(Self { scheme, extent, nominal, stretch, gap })
+        // Particles of solids keep their neighbours, so siblings meet again in a tree that stays as it is.
+        let solid_strangers = adaptivity.is_refining();
+        Some(Self { scheme, extent, nominal, stretch, gap, solid_strangers })
     }
 
     fn setting(&self, level: u8) -> Setting<'a, D> {
-        let (scheme, extent, nominal) = (self.scheme, self.extent, self.nominal);
-        Setting { scheme, extent, level, nominal, turn: RetrySlot::ALL }
+        let Self { scheme, extent, nominal, solid_strangers, .. } = *self;
+        Setting { scheme, extent, level, nominal, turn: RetrySlot::ALL, solid_strangers }
     }
 
     /// For merges in a leaf of a level.

@@ -153,7 +153,10 @@ fn strangers<const D: usize>(
     };
     // Most particles refused by the limits wait for siblings; their cells need not be searched.
     let waits = waiting(with);
-    let with: Vec<u32> = with.iter().copied().filter(|&p| !waits[p as usize]).collect();
+    let stays = |p: u32| !setting.merges_with_strangers(chunk.tags()[p as usize]);
+    let with = with.iter().copied().filter(|&p| !waits[p as usize]);
+    let (stay, with): (Vec<u32>, Vec<u32>) = with.partition(|&p| stays(p));
+    refused.extend(stay.iter().map(|&p| chunk.ids()[p as usize]));
     if with.is_empty() {
         return Vec::new();
     }

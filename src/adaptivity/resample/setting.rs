@@ -17,12 +17,20 @@ pub struct Setting<'a, const D: usize> {
     pub nominal: &'a [f64],
     /// Particles that are tried for a merge.
     pub turn: RetrySlot,
+    /// Whether particles of materials that keep their shape merge with others than their siblings.
+    pub solid_strangers: bool,
 }
 
 impl<const D: usize> Setting<'_, D> {
     /// Edge of a cell of the leaf, m.
     pub(super) fn cell(&self) -> f64 {
         self.scheme.root_cell / f64::from(1u32 << self.level.min(31))
+    }
+
+    /// Whether a particle may merge with others than its siblings.
+    pub(super) fn merges_with_strangers(&self, tag: u64) -> bool {
+        let material = usize::from(Tag::unpack(tag).material);
+        self.solid_strangers || !self.scheme.materials[material].keeps_its_shape()
     }
 
     /// Half width of an undeformed particle of a level, m.

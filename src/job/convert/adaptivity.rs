@@ -8,6 +8,7 @@ use crate::boundary::motion::{Knot, Motion, Table};
 use crate::geometry::{Shape, written};
 use crate::job::parse::source::Path;
 use crate::job::problem::{Body, BoxPolicy, TreeSetup};
+use crate::job::schema::adaptivity::Adaptivity as Written;
 use crate::job::schema::job_file::JobFile;
 use crate::text::written as number;
 
@@ -21,13 +22,16 @@ pub(super) struct Context<'a, const D: usize> {
     pub root_edge: f64,
 }
 
-/// The job's dynamic refinement, if it wants any.
+/// The job's dynamic refinement: what it writes, or sizes of particles alone where its cells differ in size.
 pub(in crate::job) fn adaptivity<const D: usize>(
     checks: &mut Checks,
     context: &Context<D>,
     path: &Path,
 ) -> Option<Adaptivity<D>> {
-    let written = context.file.adaptivity.as_ref()?;
+    let Some(written) = &context.file.adaptivity else {
+        let is_graded = context.tree.regions.iter().any(|region| region.level > context.tree.base_level);
+        return is_graded.then(|| adaptivity_of(context, &Written::default(), Vec::new(), None));
+    };
     let merge = &written.merge;
     if let BoxPolicy::Volume { max_stretch, .. } = context.boxes {
         if written.split_stretch > max_stretch {
@@ -65,6 +69,18 @@ pub(in crate::job) fn adaptivity<const D: usize>(
     let criteria: Vec<Option<Criterion<D>>> = (written.criteria.iter().enumerate())
         .map(|(i, criterion)| self::criterion(checks, criterion, context, &path.key("criteria").index(i)))
         .collect();
+    let stretch = matches!(context.boxes, BoxPolicy::Volume { .. }).then_some(written.split_stretch);
+    Some(adaptivity_of(context, written, criteria.into_iter().collect::<Option<_>>()?, stretch))
+}
+
+/// The refinement by criteria; particles split at a stretch, if any is given.
+fn adaptivity_of<const D: usize>(
+    context: &Context<D>,
+    written: &Written,
+    criteria: Vec<Criterion<D>>,
+    split_stretch: Option<f64>,
+) -> Adaptivity<D> {
+    let merge = &written.merge;
     let limits = Limits {
         velocity: merge.velocity,
         strain: merge.strain,
@@ -74,17 +90,17 @@ pub(in crate::job) fn adaptivity<const D: usize>(
     };
     let regions = context.tree.regions.iter().map(|region| (region.shape.clone(), region.level));
     let cell = context.root_edge / 4.0;
-    Some(Adaptivity {
+    Adaptivity {
         every: written.every_steps,
         buffer: written.buffer,
         base_level: context.tree.base_level,
         regions: regions.collect(),
-        criteria: criteria.into_iter().collect::<Option<_>>()?,
-        split_stretch: matches!(context.boxes, BoxPolicy::Volume { .. }).then_some(written.split_stretch),
+        criteria,
+        split_stretch,
         split_gap: written.split_gap,
         merge: merge.enabled.then_some(limits),
         nominal: context.bodies.iter().map(|body| 0.5 * cell / body.particles_per_cell).collect(),
-    })
+    }
 }
 
 fn criterion<const D: usize>(

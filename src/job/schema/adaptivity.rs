@@ -6,7 +6,8 @@ use serde::{Deserialize, Serialize};
 
 /// Dynamic refinement: the tree adapts to the material during the run, and particles split and merge with the
 /// size of the cells. Leaves are never coarser than `tree.base_level` and the levels of `tree.regions`.
-/// Without this table, tree and particles are not refined.
+/// Without this table the tree stays as it is; with `tree.regions`, particles of coarse cells still split
+/// where they come into finer ones, and merge where they are back among coarse ones.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Adaptivity {
@@ -36,6 +37,19 @@ pub struct Adaptivity {
     /// Refinement criteria; where several apply, the finest level wins.
     #[serde(default)]
     pub criteria: Vec<Criterion>,
+}
+
+impl Default for Adaptivity {
+    fn default() -> Self {
+        Self {
+            every_steps: twenty(),
+            buffer: one(),
+            split_stretch: default_split(),
+            split_gap: None,
+            merge: Merge::default(),
+            criteria: Vec::new(),
+        }
+    }
 }
 
 fn twenty() -> u64 {

@@ -187,7 +187,7 @@ pub struct Tree {
     /// Whether neighbouring leaves (across faces, edges and corners) differ by at most one level.
     #[serde(default = "yes")]
     pub graded: bool,
-    /// Regions with finer cells.
+    /// Regions with finer cells. Particles split where they come into them.
     #[serde(default)]
     pub regions: Vec<Region>,
 }

@@ -57,8 +57,8 @@ impl<const D: usize> Solver<D> {
         let nominal = &cohesion.nominal[..];
         let leaves = self.chunks.par_iter_mut().zip(self.forest.leaves()).zip(&self.leaf_data.maxima);
         let done = leaves.with_min_len(16).map(|((chunk, leaf), maxima)| {
-            let setting =
-                Setting { scheme: &scheme, extent, level: leaf.level, nominal, turn: RetrySlot::ALL };
+            let (level, turn) = (leaf.level, RetrySlot::ALL);
+            let setting = Setting { scheme: &scheme, extent, level, nominal, turn, solid_strangers: false };
             let mut splits = Splits::default();
             let cell = root_edge / f64::from(4_u32 << leaf.level);
             if halves && may_be_wide(maxima.elastic_width, cell) {

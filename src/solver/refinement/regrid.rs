@@ -135,9 +135,8 @@ impl<const D: usize> Solver<D> {
     /// Collective. Values of the criteria in the state after P2G, for the choice of the first tree: whether
     /// the tree had to change. Particles of a changed tree are to be made anew.
     pub fn regrid_before_start(&mut self) -> bool {
-        let Some(steps) = self.physics.adaptivity.as_ref().map(|adaptivity| adaptivity.every) else {
-            return false;
-        };
+        let refining = self.physics.adaptivity.as_ref().filter(|adaptivity| adaptivity.is_refining());
+        let Some(steps) = refining.map(|adaptivity| adaptivity.every) else { return false };
         self.nodes_of_state();
         self.survey_now();
         self.change_tree(steps).is_some()
@@ -318,7 +317,7 @@ impl<const D: usize> Solver<D> {
 
     /// Collective. Urgency and wanted level of each own leaf by the criteria, for files.
     pub fn refinement(&mut self) -> Option<Refinement> {
-        self.physics.adaptivity.as_ref()?;
+        self.physics.adaptivity.as_ref().filter(|adaptivity| adaptivity.is_refining())?;
         self.nodes_of_state();
         self.survey_now();
         let values = self.indicators();

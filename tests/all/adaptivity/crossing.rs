@@ -15,6 +15,15 @@ fn job(dimension: usize, body: &str, region: &str) -> String {
     one_body(dimension, domain, &criterion, &format!("model = 'hencky'\nyoung = {YOUNG}"), body)
 }
 
+/// The same cells without `[adaptivity]`: the region belongs to the tree.
+fn with_fixed_cells(dimension: usize, body: &str, region: &str) -> String {
+    let regions = format!("[tree]\nregions = [{{ level = 2, shape = {region} }}]");
+    let criterion = job(dimension, body, region);
+    let (start, rest) = criterion.split_once("[adaptivity]").expect("a table");
+    let (_, end) = rest.split_once("[[materials]]").expect("a table");
+    format!("{start}{regions}\n[[materials]]{end}")
+}
+
 fn crosses<const D: usize>(comm: &Comm, job: &str, distance: f64)
 where
     Problem<D>: TryFrom<AnyProblem>,
@@ -55,6 +64,14 @@ fn of_a_square() {
     let body = "shape = { kind = 'box', min = [0.1, 0.3], max = [0.5, 0.7] }\nvelocity = [1, 0.03]";
     let region = "{ kind = 'circle', centre = [1.2, 0.45], radius = 0.15 }";
     on_ranks(module_path!(), "of_a_square", &[1], |comm| crosses::<2>(comm, &job(2, body, region), 1.7));
+}
+
+#[test]
+fn of_a_square_through_fixed_cells() {
+    let body = "shape = { kind = 'box', min = [0.1, 0.3], max = [0.5, 0.7] }\nvelocity = [1, 0.03]";
+    let region = "{ kind = 'circle', centre = [1.2, 0.45], radius = 0.15 }";
+    let job = with_fixed_cells(2, body, region);
+    on_ranks(module_path!(), "of_a_square_through_fixed_cells", &[1], |comm| crosses::<2>(comm, &job, 1.9));
 }
 
 #[test]

@@ -38,7 +38,8 @@ fn scheme(materials: &[Box<dyn Material>], transfer: Transfer) -> Scheme<'_> {
 }
 
 fn setting<'a, const D: usize>(scheme: &'a Scheme<'a>, level: u8) -> Setting<'a, D> {
-    Setting { scheme, extent: [EXTENT; D], level, nominal: &NOMINAL, turn: merge_backoff::RetrySlot::ALL }
+    let turn = merge_backoff::RetrySlot::ALL;
+    Setting { scheme, extent: [EXTENT; D], level, nominal: &NOMINAL, turn, solid_strangers: true }
 }
 
 /// The domain as one leaf.
