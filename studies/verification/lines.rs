@@ -122,6 +122,11 @@ impl Lines {
         self.expected.values().find(|expected| expected.problem == *problem && expected.quantity == *quantity)
     }
 
+    /// Whether anything is expected of the quantity of a row.
+    pub(crate) fn is_expected(&self, row: &Row) -> bool {
+        self.expected(row).is_some()
+    }
+
     /// Why rows fail, in Markdown.
     pub(crate) fn reasons(&self, rows: &[Row]) -> String {
         let failing = rows.iter().filter(|row| row.fails());

@@ -70,35 +70,19 @@ impl Page {
         &self.lines
     }
 
-    /// Writes the page with the sections that were measured, by name, and those others of `names` that it has.
-    pub(crate) fn finish(&self, names: &[&str], measured: Vec<(&str, (String, Vec<Row>))>) {
+    /// Writes the page with a section that was measured and those others of `names` that it has.
+    pub(crate) fn update(&self, names: &[&str], section: &str, (body, new): (String, Vec<Row>)) {
         let old = std::fs::read_to_string(&self.path).unwrap_or_default();
-        let (mut rows, mut bodies) = (Vec::new(), BTreeMap::new());
-        // A page of which all sections are measured is written anew.
-        if names.iter().any(|name| measured.iter().all(|(new, _)| new != name)) {
-            rows.extend(
-                old.lines()
-                    .skip_while(|line| !line.starts_with("| ---"))
-                    .map_while(
-                        |line| {
-                            if line.starts_with("| ---") { Some(None) } else { Row::read(line).map(Some) }
-                        },
-                    )
-                    .flatten(),
-            );
-            let parts = old.split(REFERENCES).next().unwrap_or_default().split("<!-- section ").skip(1);
-            bodies.extend(parts.filter_map(|part| {
-                let (name, body) = part.split_once(" -->\n")?;
-                Some((name.to_owned(), body.trim_end().to_owned()))
-            }));
-        }
-        for (name, (body, new)) in measured {
-            bodies.insert(name.to_owned(), body.trim_end().to_owned());
-            for row in new {
-                match rows.iter().position(|old: &Row| old.is_of_same(&row)) {
-                    Some(place) => rows[place] = row,
-                    None => rows.push(row),
-                }
+        let table = old.lines().skip_while(|line| !line.starts_with("| ---")).skip(1).map_while(Row::read);
+        let mut rows: Vec<Row> = table.filter(|row| self.lines.is_expected(row)).collect();
+        let parts = old.split(REFERENCES).next().unwrap_or_default().split("<!-- section ").skip(1);
+        let parts = parts.filter_map(|part| part.split_once(" -->\n"));
+        let mut bodies: BTreeMap<&str, &str> = parts.map(|(name, body)| (name, body.trim_end())).collect();
+        bodies.insert(section, body.trim_end());
+        for row in new {
+            match rows.iter().position(|old: &Row| old.is_of_same(&row)) {
+                Some(place) => rows[place] = row,
+                None => rows.push(row),
             }
         }
         rows.sort_by_key(Row::order);

@@ -2,6 +2,7 @@
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
+use agimp::adaptivity::resample::ids::generation;
 use agimp::io::hdf5_file::Reader;
 
 use crate::checked;
@@ -100,20 +101,29 @@ impl Results {
         self.folder.join(format!("{}_{number:06}.hdf", self.name))
     }
 
+    fn ids(&self, number: usize) -> Vec<u64> {
+        let file = checked(Reader::open_alone(&self.output(number)));
+        let rows = checked(file.stored("state/particles/id")).rows;
+        checked(file.read_slab("state/particles/id", 0, rows))
+    }
+
+    /// Whether each particle of an output has not split, in the order of their identifiers.
+    pub(crate) fn are_whole(&self, number: usize) -> Vec<bool> {
+        let mut ids = self.ids(number);
+        ids.sort_unstable();
+        ids.into_iter().map(|id| generation(id) == 0).collect()
+    }
+
     /// A data set of an output, row by row, the particles in the order of their identifiers.
     pub(crate) fn particles(&self, number: usize, field: &str, width: usize) -> Vec<Vec<f64>> {
         let file = checked(Reader::open_alone(&self.output(number)));
         let numbers = |dataset: &str| {
             let rows = checked(file.stored(dataset)).rows;
-            let wide = checked(file.read_slab::<f64>(dataset, 0, rows));
-            (wide, rows as usize)
+            checked(file.read_slab::<f64>(dataset, 0, rows))
         };
-        let (ids, count) = {
-            let rows = checked(file.stored("state/particles/id")).rows;
-            (checked(file.read_slab::<u64>("state/particles/id", 0, rows)), rows as usize)
-        };
-        let (values, _) = numbers(&format!("state/particles/{field}"));
-        let mut order: Vec<usize> = (0..count).collect();
+        let ids = self.ids(number);
+        let values = numbers(&format!("state/particles/{field}"));
+        let mut order: Vec<usize> = (0..ids.len()).collect();
         order.sort_by_key(|&row| ids[row]);
         order.into_iter().map(|row| values[row * width..][..width].to_vec()).collect()
     }

@@ -89,27 +89,33 @@ fn main() -> ExitCode {
         [("wave", wave::section), ("advect", advect::section), ("spin", spin::section)];
     let is_wanted = |name: &str| only.is_empty() || only.iter().any(|wanted| wanted == name);
     let names = problems::ALL.iter().map(|(name, _)| *name).chain(sections.map(|(name, _)| name));
-    if let Some(other) = only.iter().find(|wanted| !names.clone().any(|name| name == *wanted)) {
-        panic!("found --only {other}; expected one of {}", names.collect::<Vec<_>>().join(", "));
+    let names: Vec<&str> = names.collect();
+    if let Some(other) = only.iter().find(|wanted| !names.contains(&wanted.as_str())) {
+        panic!("found --only {other}; expected one of {}", names.join(", "));
     }
-    let mut measured = Vec::new();
+    let writes = runs.is_full() && runs.set.is_empty();
+    // After each section: what has been measured stays when the run is ended.
+    let end_section = |name, start: Instant, page: &mut page::Page| {
+        println!("{name}: {:.0} s", start.elapsed().as_secs_f64());
+        let measured = page.take();
+        if writes {
+            page.update(&names, name, measured);
+        }
+    };
     for (name, problem) in problems::ALL.into_iter().filter(|(name, _)| is_wanted(name)) {
         let start = Instant::now();
         problem(&runs, &mut page);
-        println!("{name}: {:.0} s", start.elapsed().as_secs_f64());
-        measured.push((name, page.take()));
+        end_section(name, start, &mut page);
     }
     // After the runs: `mpirun` does not start from a process that is a rank itself.
     let world = checked(World::init());
     for (name, section) in sections.into_iter().filter(|(name, _)| is_wanted(name) && runs.is_full()) {
         let start = Instant::now();
         section(world.comm(), &mut page);
-        println!("{name}: {:.0} s", start.elapsed().as_secs_f64());
-        measured.push((name, page.take()));
+        end_section(name, start, &mut page);
     }
     let _ = std::fs::remove_dir_all(&runs.folder);
-    if runs.is_full() && runs.set.is_empty() {
-        page.finish(&names.collect::<Vec<_>>(), measured);
+    if writes {
         println!("{} written", path.display());
     }
     let (failures, unknown) = page.lines().failures();
