@@ -117,12 +117,9 @@ impl Results {
     /// A data set of an output, row by row, the particles in the order of their identifiers.
     pub(crate) fn particles(&self, number: usize, field: &str, width: usize) -> Vec<Vec<f64>> {
         let file = checked(Reader::open_alone(&self.output(number)));
-        let numbers = |dataset: &str| {
-            let rows = checked(file.stored(dataset)).rows;
-            checked(file.read_slab::<f64>(dataset, 0, rows))
-        };
         let ids = self.ids(number);
-        let values = numbers(&format!("state/particles/{field}"));
+        let dataset = format!("state/particles/{field}");
+        let values = checked(file.read_slab::<f64>(&dataset, 0, checked(file.stored(&dataset)).rows));
         let mut order: Vec<usize> = (0..ids.len()).collect();
         order.sort_by_key(|&row| ids[row]);
         order.into_iter().map(|row| values[row * width..][..width].to_vec()).collect()

@@ -10,7 +10,8 @@ impl<const D: usize> Solver<D> {
     /// Collective. The value of each criterion (inner) in each own leaf (outer); all zero for leaves without
     /// particles. To be called after [`Solver::survey_now`], or after a step at whose end a regrid is due.
     pub(super) fn indicators(&mut self) -> Vec<Value> {
-        let Some(adaptivity) = &self.physics.adaptivity else { return Vec::new() };
+        let refining = self.physics.adaptivity.as_ref().filter(|adaptivity| adaptivity.is_refining());
+        let Some(adaptivity) = refining else { return Vec::new() };
         let criteria = &adaptivity.criteria;
         let (mut beside_empty, mut masses) = (Vec::new(), Vec::new());
         let together = self.grid.fields_together();
