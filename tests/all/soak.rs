@@ -192,6 +192,15 @@ where
             continue;
         }
         let totals = solver.particle_totals();
+        // Those that split, whole or in halves, and those that merged are counted.
+        let ledger = &solver.adaptation.ledger;
+        let mut counts = [ledger.splits, ledger.halved, ledger.removed];
+        comm.sum_u64(&mut counts);
+        let [splits, halved, removed] = counts;
+        let due = start.count + ((1 << D) - 1) * (splits - halved) + halved - removed;
+        if totals.count != due {
+            return Err(format!("step {step}: {} of {due} particles are left", totals.count));
+        }
         if (totals.mass - start.mass).abs() > 1e-12 * start.mass {
             return Err(format!("step {step}: {} of {} kg are left", totals.mass, start.mass));
         }
