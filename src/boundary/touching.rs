@@ -43,8 +43,10 @@ pub struct Touching<const D: usize> {
     pub sticking: f64,
     /// Impulse of drag over the square of the velocity along the surface, kg s/m.
     pub drag: f64,
-    /// Velocity that an impulse of 1 kg m/s on all particles in contact brings, along the normal and along
-    /// the surface, 1/kg.
+    /// Part of the surface that it covers, m^(D-1), of a ring m²: what uniform pressure gives it a share by.
+    pub area: f64,
+    /// Velocity that uniform pressure on all particles in contact brings, along the normal and along the
+    /// surface, over the impulse on this one, 1/kg.
     pub compliance: [f64; 2],
     /// Impulse on the particle so far, kg m/s.
     pub impulse: [f64; D],
@@ -99,6 +101,7 @@ impl<const D: usize> Touching<D> {
             law,
             sticking,
             drag,
+            area,
             compliance: [0.0; 2],
             impulse,
         })
@@ -111,6 +114,7 @@ impl<const D: usize> Touching<D> {
         self.lever[0] -= ahead;
         self.sticking *= circumference;
         self.drag *= circumference;
+        self.area *= circumference;
         self
     }
 

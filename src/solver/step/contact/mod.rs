@@ -40,7 +40,7 @@ use crate::solver::state::phases::Phase;
 use crate::solver::step::colliders::Touch;
 
 /// Sweeps in a step.
-const SWEEPS: usize = 6;
+const SWEEPS: usize = 12;
 
 /// The particles of a leaf that are in reach of surfaces: copies, one for each contact.
 #[derive(Default)]

@@ -45,8 +45,8 @@ impl<const D: usize> Solver<D> {
         spreads.collect()
     }
 
-    /// Collective over neighbours. Velocity at each point of contact by an impulse of 1 kg m/s on all
-    /// particles in contact of a velocity field.
+    /// Collective over neighbours. Velocity at each point of contact by uniform pressure on all particles in
+    /// contact of a velocity field, over the impulse there: halves and splits cover less of the surface.
     pub(super) fn find_compliances(
         &mut self,
         field: usize,
@@ -54,8 +54,8 @@ impl<const D: usize> Solver<D> {
         spreads: &Spreads<D>,
         touching: &mut [Vec<Touching<D>>],
     ) {
-        let unit = std::array::from_fn(|a| if a == 0 { 1.0 } else { 0.0 });
-        self.scatter_impulses(chunks, spreads, touching, |_, _| unit);
+        let along = |size: f64| std::array::from_fn(|a| if a == 0 { size } else { 0.0 });
+        self.scatter_impulses(chunks, spreads, touching, |leaf, p| along(touching[leaf][p].area));
         let Grid { plan, fields, contact, .. } = &mut self.grid;
         let masses = &fields[field].nodes.rows;
         for_real_nodes(&mut contact.nodes, plan, |node, row| {
@@ -64,7 +64,8 @@ impl<const D: usize> Solver<D> {
         });
         let compliances = self.velocities_in_contact(chunks, spreads, touching);
         for (touching, compliances) in touching.iter_mut().zip(&compliances) {
-            touching.iter_mut().zip(compliances).for_each(|(contact, c)| contact.compliance = [c[0]; 2]);
+            let each = touching.iter_mut().zip(compliances);
+            each.for_each(|(contact, c)| contact.compliance = [c[0] / contact.area; 2]);
         }
     }
 

@@ -256,6 +256,7 @@ impl<const D: usize> Foot<D> {
             // Of an area of 1 m² and a density of 1 kg/m³, until these are known.
             sticking: law.cohesion() * over,
             drag: law.drag() * over,
+            area: 1.0,
             compliance: [0.0; 2],
             impulse: [0.0; D],
         }
