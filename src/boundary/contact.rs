@@ -1,7 +1,7 @@
 //! Boundary condition for the velocity of material at a surface: a face of the domain, or a collider.
 use std::fmt;
 
-use super::gap::Bounds;
+use super::gap::{Bounds, Gap};
 use super::vector::length;
 use crate::text::{number, quantity};
 
@@ -95,9 +95,9 @@ impl Contact {
         matches!(self, Self::Sticky | Self::Slip | Self::Separating { .. })
     }
 
-    /// Bounds that it sets across a gap (m) to material between nodes with cells of this edge (m), in a step
-    /// of length `dt`, s.
-    pub fn across(self, gap: f64, cell: f64, dt: f64) -> Bounds {
+    /// Bounds that it sets across a gap to material between nodes with cells of this edge (m), in a step of
+    /// length `dt`, s.
+    pub fn across(self, gap: Gap, cell: f64, dt: f64) -> Bounds {
         Bounds::across(gap, cell, dt, matches!(self, Self::Sticky | Self::Slip))
     }
 
@@ -197,6 +197,7 @@ mod tests {
     #[test]
     fn across_a_gap_material_moves_freely_up_to_the_surface() {
         let after = |contact: Contact, gap: f64, mut v: [f64; 2]| {
+            let gap = Gap { width: gap, cover: 1.0 };
             contact.apply_within(contact.across(gap, 1.0, 0.1), &mut v, &[0.0, 1.0]);
             v
         };

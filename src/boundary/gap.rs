@@ -8,6 +8,12 @@
 //! where the share of the volume is not. A condition on the velocity of a node is then one that the surface
 //! of the material obeys: without the gap, material would be stopped as soon as it enters the hat, up to a
 //! cell early, and the few particles in the hat would carry the force of all.
+//!
+//! A node beside the edge of a body has a sliver of the material, a force that does not shrink with its mass,
+//! and the gap of the rows over it. What it does hardly moves the material, so this gap never closes: free to
+//! move over all of it in each step, the node would move without end, and edges of bodies under load would
+//! sink into the surface. So it moves over the share of the gap that the material covers of its part of the
+//! surface.
 /// Width of a gap, in cells, up to which cohesion and drag act.
 pub const STICKS: f64 = 0.1;
 
@@ -34,6 +40,32 @@ pub fn height(volume: f64, slope: f64, cell: f64, bend: f64) -> f64 {
     // A plane in the lower half of the hat leaves (1 + s)² / 2 of it behind it, at s = -y: the same ratio,
     // solved for s.
     if q <= 0.5 { 1.0 - 2.0 * q } else { q.mul_add(q, 2.0).sqrt() - q - 1.0 }
+}
+
+/// `-Σ V ∂w/∂n` of material that covers all of a node's part of a surface, m²: the area of that part if the
+/// surface goes through the node (m²), times the hat at the height of the material, in cells.
+pub fn full_slope(area: f64, height: f64) -> f64 {
+    area * (1.0 - height.abs()).max(0.0)
+}
+
+/// A gap between a surface and material at a node or a foot.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Gap {
+    /// How wide it is, m; negative where the material has passed the surface.
+    pub width: f64,
+    /// Share of the surface there that the material covers, 0 to 1.
+    pub cover: f64,
+}
+
+impl Gap {
+    /// Where material touches, however little of it.
+    pub const CLOSED: Self = Self { width: 0.0, cover: 1.0 };
+
+    /// A gap so wide (m) to material with this slope, where all that covered the surface would have a `full`
+    /// one, m².
+    pub fn new(width: f64, slope: f64, full: f64) -> Self {
+        Self { width, cover: if slope < full { (slope / full).max(0.0) } else { 1.0 } }
+    }
 }
 
 /// `-Σ V ∂w/∂n` along a normal, from the sum of gradients `Σ V ∇w`.
@@ -98,7 +130,8 @@ impl Meets {
 /// Condition of a surface on the velocity of material at it in a step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Bounds {
-    /// Least velocity along the normal, relative to the surface, m/s: that which closes the gap in the step.
+    /// Least velocity along the normal, relative to the surface, m/s: that which closes the gap in the step,
+    /// or as much of it as the material covers of the surface.
     pub least: f64,
     /// Greatest, m/s; infinite where nothing holds the material.
     pub most: f64,
@@ -112,12 +145,12 @@ impl Bounds {
     /// Of material that touches the surface.
     pub const TOUCHING: Self = Self { least: 0.0, most: 0.0, sticking: 0.0, drag: 0.0 };
 
-    /// Across a gap (m) between nodes with cells of this edge (m), in a step of length `dt`, s, to a surface
+    /// Across a gap between nodes with cells of this edge (m), in a step of length `dt`, s, to a surface
     /// that holds material `both_ways` or lets it leave.
-    pub fn across(gap: f64, cell: f64, dt: f64, both_ways: bool) -> Self {
+    pub fn across(Gap { width, cover }: Gap, cell: f64, dt: f64, both_ways: bool) -> Self {
         let closed = if both_ways { CLOSED_BOTH_WAYS } else { CLOSED };
-        let least = if gap > closed * cell { -gap / dt } else { 0.0 };
-        let most = if both_ways && gap <= HELD * cell { 0.0 } else { f64::INFINITY };
+        let least = if width > closed * cell { -cover * width / dt } else { 0.0 };
+        let most = if both_ways && width <= HELD * cell { 0.0 } else { f64::INFINITY };
         Self { least, most, sticking: 0.0, drag: 0.0 }
     }
 }
@@ -168,17 +201,33 @@ mod tests {
         approx::assert_relative_eq!(height(0.125 * volume, 0.25 * slope, 0.5, 0.0), 0.25, epsilon = 1e-12);
     }
 
+    /// A node with a sliver of the material has as little of its gap.
+    #[test]
+    fn slivers_move_over_a_share_of_the_gap() {
+        for cover in [1.0, 0.5, 0.01] {
+            let (volume, slope) = sums(0.25, cover);
+            let height = height(volume, slope, 1.0, 0.0);
+            let gap = Gap::new(height, slope, full_slope(1.0, height));
+            approx::assert_relative_eq!(gap.cover, cover, epsilon = 1e-12);
+            let bounds = Bounds::across(gap, 1.0, 0.5, false);
+            approx::assert_relative_eq!(bounds.least, -0.5 * cover, epsilon = 1e-12);
+        }
+        assert_eq!(Gap::new(0.1, 1.2, 1.0).cover, 1.0);
+        assert_eq!(Gap::new(1.0, 0.2, full_slope(1.0, 1.0)).cover, 1.0);
+    }
+
     #[test]
     fn gaps_close_within_the_step_and_no_further() {
         let (free, both_ways) = (f64::INFINITY, true);
-        assert_eq!(Bounds::across(-0.1, 1.0, 0.5, both_ways), Bounds::TOUCHING);
-        assert_eq!(Bounds::across(0.01, 1.0, 0.5, both_ways), Bounds::TOUCHING);
-        assert_eq!(Bounds::across(0.25, 1.0, 0.5, both_ways), Bounds { least: -0.5, ..Bounds::TOUCHING });
+        let across = |width, both| Bounds::across(Gap { width, cover: 1.0 }, 1.0, 0.5, both);
+        assert_eq!(across(-0.1, both_ways), Bounds::TOUCHING);
+        assert_eq!(across(0.01, both_ways), Bounds::TOUCHING);
+        assert_eq!(across(0.25, both_ways), Bounds { least: -0.5, ..Bounds::TOUCHING });
         let far = Bounds { least: -1.5, most: free, ..Bounds::TOUCHING };
-        assert_eq!(Bounds::across(0.75, 1.0, 0.5, both_ways), far);
-        assert_eq!(Bounds::across(0.75, 1.0, 0.5, false), far);
+        assert_eq!(across(0.75, both_ways), far);
+        assert_eq!(across(0.75, false), far);
         let near = Bounds { least: -0.02, most: free, ..Bounds::TOUCHING };
-        assert_eq!(Bounds::across(0.01, 1.0, 0.5, false), near);
+        assert_eq!(across(0.01, false), near);
         let free = Contact::default().bounds(Bounds::TOUCHING);
         assert_eq!(free, Bounds { most: f64::INFINITY, ..Bounds::TOUCHING });
     }

@@ -23,7 +23,7 @@ pub use absorbing::Absorbing;
 pub use bodies::BodyContacts;
 pub use collider::{ActsOn, Collider, ColliderState};
 pub use contact::Contact;
-pub use gap::{Bounds, Meets};
+pub use gap::{Bounds, Gap, Meets};
 pub use touching::{Touching, meets};
 
 /// Treatment of particles that leave the domain.

@@ -268,26 +268,38 @@ fn sheets_hold_water() {
     }
 }
 
-/// A block of rubber, ν = 0.45, between smooth plates that press it together by a tenth: the stretch l along
-/// the plates, the stress and the force F follow from `μ (l² - 1) + λ ln J = 0`, `J = 0.9 l`. Where nodes
-/// behind a plate were free, the row of particles at it had half of the stress and F-bar took 16 % of the force.
+/// A block of rubber, ν = 0.45, between smooth plates that press it together: the stretch l along the plates,
+/// the stress and the force F follow from `μ (l² - 1) + λ ln J = 0`, `J = h l`. Where nodes behind a plate were
+/// free, the row of particles at it had half of the stress and F-bar took 16 % of the force. At 30 % particles
+/// have split: where sweeps did not know how much of a plate each covers, and where nodes beside the edges of
+/// the block moved over gaps that never closed, F-bar took 3 to 9 %.
 #[test]
 fn blocks_between_plates_bear_the_force_of_uniform_stress() {
-    let (young, poisson, height) = (1e6, 0.45, 0.9_f64);
+    let (young, poisson) = (1e6, 0.45);
     let mu = 0.5 * young / (1.0 + poisson);
     let lambda = young * poisson / ((1.0 + poisson) * (1.0 - 2.0 * poisson));
-    let (mut low, mut high) = (1.0, 2.0);
-    for _ in 0..60 {
-        let l: f64 = 0.5 * (low + high);
-        if mu * (l * l - 1.0) + lambda * (height * l).ln() > 0.0 { high = l } else { low = l }
-    }
     // Of a width of 0.1 m: the Kirchhoff stress over the height.
-    let stress = mu * (height * height - 1.0) + lambda * (height * low).ln();
-    let exact = -0.1 * stress / height;
-    for bar in [false, true] {
+    let exact = |height: f64| {
+        let (mut low, mut high) = (1.0, 2.0);
+        for _ in 0..60 {
+            let l: f64 = 0.5 * (low + high);
+            if mu * (l * l - 1.0) + lambda * (height * l).ln() > 0.0 { high = l } else { low = l }
+        }
+        -0.1 * (mu * (height * height - 1.0) + lambda * (height * low).ln()) / height
+    };
+    let cases = [
+        ("particles", 0.1, false),
+        ("particles", 0.1, true),
+        ("particles", 0.3, true),
+        ("nodes", 0.3, false),
+        ("nodes", 0.3, true),
+    ];
+    for (acts_on, pressed, bar) in cases {
+        let case = format!("plates on {acts_on}, {pressed}, f_bar {bar}");
+        let exact = exact(1.0 - pressed);
         let plate = |name: &str, y: [f64; 2]| {
             format!(
-                "[[colliders]]\nname = '{name}'\nacts_on = 'particles'\n\
+                "[[colliders]]\nname = '{name}'\nacts_on = '{acts_on}'\n\
                  shape = {{ kind = 'box', min = [-0.18, {}], max = [0.18, {}] }}\n",
                 y[0], y[1]
             )
@@ -297,17 +309,19 @@ fn blocks_between_plates_bear_the_force_of_uniform_stress() {
              [tree]\nbase_level = 1\n[[materials]]\nname = 'rubber'\ndensity = 1100\nmodel = 'neo_hookean'\n\
              young = {young}\npoisson = {poisson}\n[[bodies]]\nname = 'block'\nmaterial = 'rubber'\n\
              shape = {{ kind = 'box', min = [-0.05, 0], max = [0.05, 0.1] }}\n{}{}\
-             motion = {{ kind = 'table', smooth = true, rows = [{{ time = 0 }}, {{ time = 0.1, translation = [0, -0.01] }}] }}\n\
-             [numerics]\nf_bar = {bar}\n[time]\nend = 0.12\n[output]\npicture = false\n",
+             motion = {{ kind = 'table', smooth = true, rows = [{{ time = 0 }}, {{ time = {pressed}, translation = [0, {}] }}] }}\n\
+             [numerics]\nf_bar = {bar}\n[time]\nend = {}\n[output]\npicture = false\n",
             plate("bottom", [-0.05, 0.0]),
             plate("top", [0.1, 0.15]),
+            -0.1 * pressed,
+            pressed + 0.02,
         ));
-        let (start, _) = history.at("time", 0.1);
+        let (start, _) = history.at("time", pressed);
         let time = history.last("time") - start;
         let [below, above] = ["force_bottom_y", "force_top_y"].map(|of| history.integral(of, start) / time);
-        println!("f_bar {bar}: {:.4} and {:.4} of the force", -below / exact, above / exact);
+        println!("{case}: {:.4} and {:.4} of the force", -below / exact, above / exact);
         for force in [-below, above] {
-            assert!((force / exact - 1.0).abs() < 0.03, "f_bar {bar}: {force} N/m of {exact} N/m");
+            assert!((force / exact - 1.0).abs() < 0.03, "{case}: {force} N/m of {exact} N/m");
         }
     }
 }

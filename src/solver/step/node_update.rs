@@ -3,7 +3,7 @@ use rayon::prelude::*;
 
 use crate::boundary::absorbing::AbsorbingFaces;
 use crate::boundary::motion::Rate;
-use crate::boundary::{Bounds, Contact, gap};
+use crate::boundary::{Bounds, Contact, Gap, gap};
 use crate::exact_sum::ExactSum;
 use crate::grid::mask::block_nodes;
 use crate::grid::{GridPlan, NodeFields};
@@ -204,7 +204,11 @@ impl Gaps<'_> {
         // At a face the slope is the area that the material has of it.
         let area = if self.touches || gap <= gap::STICKS * cell { slope.max(0.0) } else { 0.0 };
         let (sticking, drag) = (cohesion * area, if row[3] > 0.0 { drag * area / row[3] } else { 0.0 });
-        let bounds = if self.touches { Bounds::TOUCHING } else { law.across(gap, cell, self.over) };
+        let full = gap::full_slope(cell.powi(D as i32 - 1) * self.coordinates.around(x[0]), gap / cell);
+        let bounds = match self.touches {
+            true => Bounds::TOUCHING,
+            false => law.across(Gap::new(gap, slope, full), cell, self.over),
+        };
         Bounds { sticking, drag, ..bounds }
     }
 }

@@ -7,7 +7,7 @@
 use rayon::prelude::*;
 
 use crate::boundary::motion::Rate;
-use crate::boundary::{Bounds, Collider, ColliderState, Contact, gap};
+use crate::boundary::{Bounds, Collider, ColliderState, Contact, Gap, gap};
 use crate::exact_sum::ExactSum;
 use crate::grid::mask::{bits, block_nodes};
 use crate::kernel::{Coordinates, Row};
@@ -63,7 +63,8 @@ fn open<const D: usize>(
             let above = (0..D).fold(0.0, |sum, a| (x[a] - plane.foot[a]).mul_add(plane.normal[a], sum));
             let bend = of.coordinates.bend(plane.normal[0], cell, x[0]);
             let gap = gap::height(sums[row].0[3], slope, cell, bend).mul_add(cell, above);
-            (Contact::Sticky.across(gap, cell, of.over), plane.normal)
+            let full = gap::full_slope(cell.powi(D as i32 - 1) * of.coordinates.around(x[0]), gap / cell);
+            (Contact::Sticky.across(Gap::new(gap, slope, full), cell, of.over), plane.normal)
         })
         .collect();
     if demands.iter().any(|(bounds, _)| bounds.least == 0.0) { Vec::new() } else { demands }

@@ -1,5 +1,5 @@
 //! Feet: the places of a collider's surface at which it holds the nodes behind it.
-use crate::boundary::{Contact, Touching, gap};
+use crate::boundary::{Contact, Gap, Touching, gap};
 use crate::grid::GridPlan;
 use crate::grid::leaf_geometry::leaf_box;
 use crate::grid::mask::{block_nodes, node_of_bit, offset, offset_count, offset_index};
@@ -189,7 +189,7 @@ impl<const D: usize> Foot<D> {
         }
     }
 
-    /// Gap between the surface and the material, m: the mean over the corners of the cell by the parts of the
+    /// Gap between the surface and the material: the mean over the corners of the cell by the parts of the
     /// material's surface that they have. `sizes` has `Σ V w / h` of the corners in its first lanes, `slopes`
     /// has `Σ V ∇w`. What has yielded touches. `None` where the material lies on the other side.
     pub(super) fn gap(
@@ -197,32 +197,41 @@ impl<const D: usize> Foot<D> {
         coordinates: Coordinates,
         sizes: &[[f64; 4]; CORNERS],
         slopes: &[[f64; 4]; CORNERS],
-    ) -> Option<f64> {
+    ) -> Option<Gap> {
         let (mut sum, mut area, mut filled) = (0.0, 0.0, 0.0);
         let (mut size, mut steepness) = (0.0, 0.0);
+        // Constrained nodes have what their parents have, in cells twice as wide.
+        let cell =
+            |corner: usize| if self.constrained >> corner & 1 == 1 { 2.0 * self.cell } else { self.cell };
+        let above =
+            |corner: usize| (0..D).fold(0.0, |sum, a| self.arms[corner][a].mul_add(self.normal[a], sum));
         for corner in 0..1usize << D {
             let slope = gap::slope(&slopes[corner], &self.normal);
-            // Constrained nodes have what their parents have, in cells twice as wide.
-            let cell = if self.constrained >> corner & 1 == 1 { 2.0 * self.cell } else { self.cell };
+            let cell = cell(corner);
             size += self.weights[corner] * sizes[corner][0];
             steepness += self.weights[corner] * slope.abs();
             filled += self.weights[corner] * sizes[corner][0] / cell.powi(D as i32 - 1);
             if slope > 0.0 && self.weights[corner] > 0.0 {
                 let part = self.weights[corner] * slope;
-                let above = (0..D).fold(0.0, |sum, a| self.arms[corner][a].mul_add(self.normal[a], sum));
                 let bend = coordinates.bend(self.normal[0], cell, self.at[0] + self.arms[corner][0]);
                 let height = gap::height(sizes[corner][0], slope, 1.0, bend);
-                sum += part * height.mul_add(cell, above);
+                sum += part * height.mul_add(cell, above(corner));
                 area += part;
             }
         }
         if gap::has_yielded(size, steepness) {
-            return Some(0.0);
+            return Some(Gap::CLOSED);
         }
-        match area > 0.0 {
-            true => Some(sum / area),
-            false => (filled >= FULL).then_some(-self.cell),
+        if area <= 0.0 {
+            return (filled >= FULL).then_some(Gap { width: -self.cell, cover: 1.0 });
         }
+        let width = sum / area;
+        let full = (0..1usize << D).fold(0.0, |full, corner| {
+            let cell = cell(corner);
+            let part = cell.powi(D as i32 - 1) * coordinates.around(self.at[0] + self.arms[corner][0]);
+            full + self.weights[corner] * gap::full_slope(part, (width - above(corner)) / cell)
+        });
+        Some(Gap::new(width, area, full))
     }
 
     /// Greatest impulse along each axis of a foot with this law whose impulse along the normal is 1 kg m/s,
@@ -236,15 +245,15 @@ impl<const D: usize> Foot<D> {
         self.normal.map(|n| along.mul_add((1.0 - n * n).max(0.0).sqrt(), n.abs()))
     }
 
-    /// The contact across a gap (m) in a step of these lengths with a surface that moves so fast, m/s.
+    /// The contact across a gap in a step of these lengths with a surface that moves so fast, m/s.
     pub(super) fn touching(
         &self,
         law: Contact,
         surface: [f64; D],
-        gap: f64,
+        gap: Gap,
         lengths: Lengths,
     ) -> Touching<D> {
-        let over = if gap <= gap::STICKS * self.cell { lengths.kick } else { 0.0 };
+        let over = if gap.width <= gap::STICKS * self.cell { lengths.kick } else { 0.0 };
         Touching {
             collider: self.collider,
             normal: self.normal,

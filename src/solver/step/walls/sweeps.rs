@@ -4,7 +4,7 @@ use rayon::prelude::*;
 use super::at_nodes::{is_at_another, obey};
 use super::feet::LeafFeet;
 use crate::boundary::motion::Rate;
-use crate::boundary::{Bounds, Collider, ColliderState, gap};
+use crate::boundary::{Bounds, Collider, ColliderState, Gap, gap};
 use crate::exact_sum::ExactSum;
 use crate::grid::Window;
 use crate::grid::mask::block_nodes;
@@ -129,7 +129,7 @@ impl<const D: usize> Solver<D> {
                 }
                 let collider = &colliders[foot.collider];
                 let gap = match touches || !collider.contact.has_gap() {
-                    true => Some(0.0),
+                    true => Some(Gap::CLOSED),
                     false => foot.gap(self.physics.coordinates, sizes, &foot.at_corners(&nodes.rows)),
                 };
                 *touching = gap.map(|gap| {
