@@ -42,10 +42,10 @@ pub fn height(volume: f64, slope: f64, cell: f64, bend: f64) -> f64 {
     if q <= 0.5 { 1.0 - 2.0 * q } else { q.mul_add(q, 2.0).sqrt() - q - 1.0 }
 }
 
-/// `-Σ V ∂w/∂n` of material that covers all of a node's part of a surface, m²: the area of that part if the
-/// surface goes through the node (m²), times the hat at the height of the material, in cells.
-pub fn full_slope(area: f64, height: f64) -> f64 {
-    area * (1.0 - height.abs()).max(0.0)
+/// `-Σ V ∂w/∂n` of material that covers all of a node's part of a surface, m²: the area of a face of its
+/// cells (m²), times the hat at the height of the material, in cells.
+pub fn full_slope(face: f64, height: f64) -> f64 {
+    face * (1.0 - height.abs()).max(0.0)
 }
 
 /// A gap between a surface and material at a node or a foot.

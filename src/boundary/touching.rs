@@ -43,7 +43,8 @@ pub struct Touching<const D: usize> {
     pub sticking: f64,
     /// Impulse of drag over the square of the velocity along the surface, kg s/m.
     pub drag: f64,
-    /// Part of the surface that it covers, m^(D-1), of a ring m²: what uniform pressure gives it a share by.
+    /// Part of the surface that it covers, m² (of a slice one metre thick in the plane): its share of a
+    /// uniform pressure. Of a foot, whose sweeps are scaled by equal impulses, 1.
     pub area: f64,
     /// Velocity that uniform pressure on all particles in contact brings, along the normal and along the
     /// surface, over the impulse on this one, 1/kg.

@@ -150,6 +150,12 @@ impl Coordinates {
         }
     }
 
+    /// Area of a face of a cell of this edge (m) at this first coordinate (m), m²: in the plane of a slice
+    /// one metre thick, in axisymmetry of the whole ring.
+    pub fn face_area<const D: usize>(self, cell: f64, x: f64) -> f64 {
+        cell.powi(D as i32 - 1) * self.around(x)
+    }
+
     /// Curvature, in cells of this edge (m), of a surface at this first coordinate (m) whose normal has this
     /// first component, along the circumference. Positive where material over it lies outside.
     pub fn bend(self, normal: f64, cell: f64, x: f64) -> f64 {

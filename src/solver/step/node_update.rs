@@ -204,10 +204,11 @@ impl Gaps<'_> {
         // At a face the slope is the area that the material has of it.
         let area = if self.touches || gap <= gap::STICKS * cell { slope.max(0.0) } else { 0.0 };
         let (sticking, drag) = (cohesion * area, if row[3] > 0.0 { drag * area / row[3] } else { 0.0 });
-        let full = gap::full_slope(cell.powi(D as i32 - 1) * self.coordinates.around(x[0]), gap / cell);
-        let bounds = match self.touches {
-            true => Bounds::TOUCHING,
-            false => law.across(Gap::new(gap, slope, full), cell, self.over),
+        let bounds = if self.touches {
+            Bounds::TOUCHING
+        } else {
+            let full = gap::full_slope(self.coordinates.face_area::<D>(cell, x[0]), gap / cell);
+            law.across(Gap::new(gap, slope, full), cell, self.over)
         };
         Bounds { sticking, drag, ..bounds }
     }

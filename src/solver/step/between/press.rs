@@ -159,7 +159,7 @@ impl<const D: usize> Press<'_, D> {
                 let cell = self.plan.cell(self.plan.blocks[block].level);
                 // The hat of a node on the axis has its mean at a third of a cell, and half the width.
                 let x = self.plan.node_place(&self.plan.blocks[block], bit as usize)[0].max(cell / 6.0);
-                let least = LEAST_AREA * cell.powi(D as i32 - 1) * self.coordinates.around(x);
+                let least = LEAST_AREA * self.coordinates.face_area::<D>(cell, x);
                 let new = bodies.iter().filter(|body| body.pressed[1] >= least);
                 pressed.forces.extend(new.map(|body| {
                     let [force, area] = body.pressed;

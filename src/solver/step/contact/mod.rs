@@ -6,8 +6,8 @@
 //! add up to 1 and their mean is x + a, so that momentum and angular momentum are those of J at that point,
 //! and the velocity `Σ W_j v_j` of that point, which the law asks for, is the adjoint. All impulses
 //! together are the solution of a problem of complementarity (Moreau 1988, Jean 1999); here it is sought from
-//! zero by a fixed number of Jacobi's sweeps, each scaled by the response to an impulse on all particles at
-//! once, so that uniform pressure is exact after the first. For rings x is the centre of mass, about which
+//! zero by a fixed number of Jacobi's sweeps, each scaled by the response to uniform pressure on all
+//! particles at once, which is so exact after the first. For rings x is the centre of mass, about which
 //! their weights are taken, and J the impulse on the whole ring.
 //!
 //! The particles in contact are copied into chunks of their own, which pass through bins, sums over ranks and

@@ -63,7 +63,7 @@ fn open<const D: usize>(
             let above = (0..D).fold(0.0, |sum, a| (x[a] - plane.foot[a]).mul_add(plane.normal[a], sum));
             let bend = of.coordinates.bend(plane.normal[0], cell, x[0]);
             let gap = gap::height(sums[row].0[3], slope, cell, bend).mul_add(cell, above);
-            let full = gap::full_slope(cell.powi(D as i32 - 1) * of.coordinates.around(x[0]), gap / cell);
+            let full = gap::full_slope(of.coordinates.face_area::<D>(cell, x[0]), gap / cell);
             (Contact::Sticky.across(Gap::new(gap, slope, full), cell, of.over), plane.normal)
         })
         .collect();

@@ -228,8 +228,8 @@ impl<const D: usize> Foot<D> {
         let width = sum / area;
         let full = (0..1usize << D).fold(0.0, |full, corner| {
             let cell = cell(corner);
-            let part = cell.powi(D as i32 - 1) * coordinates.around(self.at[0] + self.arms[corner][0]);
-            full + self.weights[corner] * gap::full_slope(part, (width - above(corner)) / cell)
+            let face = coordinates.face_area::<D>(cell, self.at[0] + self.arms[corner][0]);
+            full + self.weights[corner] * gap::full_slope(face, (width - above(corner)) / cell)
         });
         Some(Gap::new(width, area, full))
     }
