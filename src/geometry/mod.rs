@@ -31,4 +31,4 @@ pub use mesh::Mesh;
 pub use moments::Moments;
 pub use rotation::rotation;
 pub use sampling::Sampling;
-pub use shape::{Placement, Shape, Side, common_point};
+pub use shape::{Faces, Placement, Shape, Side, common_point};

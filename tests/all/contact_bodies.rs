@@ -207,6 +207,43 @@ fn blocks_slide_on_slabs_as_coulomb_says() {
     }
 }
 
+/// Without friction a block slides down a slab freely whatever the angle of their surfaces to the grid. On the
+/// lattice of the cells surfaces are steps, and interlock: it comes 0.50 and 0.91 of its way.
+#[test]
+fn blocks_slide_freely_on_slabs_across_the_grid() {
+    for degrees in [10.0_f64, 20.0] {
+        let (sine, cosine) = degrees.to_radians().sin_cos();
+        let turned = |min: [f64; 2], max: [f64; 2]| {
+            format!(
+                "kind = 'rotated', angle = {}, centre = [2, 1.5], shape = {{ {} }}",
+                -degrees,
+                cube(min, max)
+            )
+        };
+        let job = format!(
+            "{RUBBER}[domain]\nsize = [4, 3]\nroot_edge = 0.25\n{}{}\
+             [[contact]]\nbetween = ['slab', 'block']\n\
+             [[loads]]\nname = 'hold'\nkind = 'velocity'\nx = 0\ny = 0\nshape = {{ {} }}\n\
+             [[probes]]\nname = 'block'\nbodies = ['block']\nquantities = ['centre']\n\
+             [time]\nend = 0.5\n[history]\nevery_steps = 20\n",
+            body("slab", &turned([0.5, 1.1], [3.5, 1.5]), "[0, 0]"),
+            body("block", &turned([0.8, 1.5], [1.3, 2.0]), "[0, 0]"),
+            turned([0.4, 1.0], [3.6, 1.25]),
+        )
+        .replace("dimension = 2\n", "dimension = 2\ngravity = [0, '-9.81 * min(t / 0.1, 1)']\n")
+        .replace("young = 1e6", "young = 1e7");
+        let history = history(&job);
+        let [x, y] =
+            ["centre_block_x", "centre_block_y"].map(|name| history.last(name) - history.column(name)[0]);
+        // Gravity grows over 0.1 s.
+        let rest = history.last("time") - 0.1;
+        let exact = 9.81 * sine * (rest * rest / 2.0 + 0.05 * rest + 0.01 / 6.0);
+        let found = x * cosine - y * sine;
+        println!("{degrees} degrees: {found} m of {exact}");
+        assert!((found / exact - 1.0).abs() < 0.01, "{degrees} degrees: {found} of {exact}");
+    }
+}
+
 /// A block that rests on a slab between slip walls presses on it with its weight, seen from both sides, also
 /// beside a level jump; away from the joint nothing presses. Where particles come to does not depend on whether
 /// the pressure is written.

@@ -5,7 +5,7 @@
 //! | this | the type; its distance, membership and bounds |
 //! | `primitives`, `gradient` | distances of the primitives; the gradient of the distance |
 //! | `classify`, `common_point` | on which side of a shape a box lies; a point that two shapes share |
-//! | `thick` | whether a solid is thick everywhere |
+//! | `thick`, `on_lattice` | whether a solid is thick everywhere; lattices of boxes that fill it |
 use self::primitives::{
     box_distance, frustum_distance, half_space_distance, polygon_distance, sphere_distance,
 };
@@ -15,11 +15,13 @@ use crate::geometry::{Aabb, Frustum, Mesh};
 mod classify;
 mod common_point;
 mod gradient;
+mod on_lattice;
 pub(super) mod primitives;
 mod thick;
 
 pub use classify::Side;
 pub use common_point::common_point;
+pub use on_lattice::Faces;
 
 /// A rotation about a point, from the shape's own frame to space: `x = R (y - pivot) + pivot`.
 #[derive(Clone, Copy, Debug, PartialEq)]

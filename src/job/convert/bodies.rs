@@ -7,7 +7,7 @@ use super::materials::material_setup;
 use super::settings::is_symmetric;
 use super::stages;
 use crate::geometry::written::Shape as Written;
-use crate::geometry::{Aabb, Sampling, Shape};
+use crate::geometry::{Aabb, Faces, Sampling, Shape};
 use crate::job::parse::error::QUOTED;
 use crate::job::parse::source::Path;
 use crate::job::problem::*;
@@ -36,24 +36,36 @@ pub(super) fn bodies<const D: usize>(
         })
         .flatten()
         .collect();
-    (bodies.len() == file.bodies.len()).then(|| fit_curved(bodies, file, space))
+    (bodies.len() == file.bodies.len()).then(|| fit(bodies, file, space))
 }
 
-/// Without a word, bodies that keep their shape are fitted to it if they or any that they touch, directly or
-/// through others, are curved: particles of what flows leave their places anyway. Bodies that touch one on
-/// the lattice stay there, since the parts of one and the whole boxes of the other would overlap.
-fn fit_curved<const D: usize>(mut bodies: Vec<Body<D>>, file: &JobFile, space: &Space<D>) -> Vec<Body<D>> {
+/// Without a word, particles of bodies that keep their shape fill it. Where a lattice has planes in all faces
+/// of a body and of those that it touches, directly or through others, their particles lie on that; else,
+/// where any surface is off the lattice of the coarsest cells, they are fitted to it, but for inclined faces
+/// that no other body slides along. Particles of what flows leave their places anyway. Bodies that touch one
+/// on the lattice of the cells stay there, since the parts of one and the whole boxes of the other would
+/// overlap.
+fn fit<const D: usize>(mut bodies: Vec<Body<D>>, file: &JobFile, space: &Space<D>) -> Vec<Body<D>> {
     let slack = 1e-9 * space.size.iter().fold(0.0, |most: f64, &size| most.max(size));
     let bounds: Vec<Aabb<D>> = bodies.iter().map(|body| body.shape.bounds().grown(slack)).collect();
-    let can_be = |number: usize| match file.bodies[number].sampling {
-        Some(sampling) => sampling == file::Sampling::Fitted,
-        None => {
-            let material = material_setup(&file.materials[bodies[number].material]).build();
-            let is_whole = particles_per_leaf(bodies[number].particles_per_cell).fract() == 0.0;
-            material.keeps_its_shape() && bodies[number].given.is_none() && is_whole
-        }
+    let may_move = |number: usize| {
+        let material = material_setup(&file.materials[bodies[number].material]).build();
+        file.bodies[number].sampling.is_none() && material.keeps_its_shape() && bodies[number].given.is_none()
     };
-    let can_be: Vec<bool> = (0..bodies.len()).map(can_be).collect();
+    let may_move: Vec<bool> = (0..bodies.len()).map(may_move).collect();
+    let may_be_fitted = |number: usize| match file.bodies[number].sampling {
+        Some(sampling) => sampling == file::Sampling::Fitted,
+        None => may_move[number] && particles_per_leaf(bodies[number].particles_per_cell).fract() == 0.0,
+    };
+    let may_be_fitted: Vec<bool> = (0..bodies.len()).map(may_be_fitted).collect();
+    // Steps of surfaces interlock.
+    let slides = !file.contact.is_empty();
+    let domain = Aabb::new([0.0; D], space.size);
+    let is_along_axes = |body: &Body<D>| body.shape.add_faces(&domain, &mut Faces::default());
+    let is_along_axes: Vec<bool> = bodies.iter().map(is_along_axes).collect();
+    // Cells of several sizes would cut the boxes of a lattice of its own.
+    let is_uniform = file.tree.regions.is_empty() && file.adaptivity.is_none();
+    let leaf = file.domain.root_edge / f64::from(1_u32 << file.tree.base_level);
     let mut is_seen = vec![false; bodies.len()];
     for first in 0..bodies.len() {
         let (mut group, mut next) = (Vec::new(), vec![first]);
@@ -64,12 +76,37 @@ fn fit_curved<const D: usize>(mut bodies: Vec<Body<D>>, file: &JobFile, space: &
                 next.extend((0..bodies.len()).filter(|other| !is_seen[*other]).filter(touches));
             }
         }
-        let is_curved = group.iter().any(|&number| bodies[number].shape.is_curved());
-        if is_curved && group.iter().all(|&number| can_be[number]) {
+        let lattice = |of: &[usize]| lattice_of(of.iter().map(|&number| &bodies[number]), leaf, space);
+        if group.iter().all(|&number| lattice(&[number]) == Some([0.0; D])) {
+            continue;
+        }
+        let own = lattice(&group).filter(|_| is_uniform && group.iter().all(|&number| may_move[number]));
+        if let Some(origin) = own {
+            group.iter().for_each(|&number| bodies[number].lattice = origin);
+        } else if group.iter().all(|&number| may_be_fitted[number])
+            && (slides
+                || group.iter().any(|&number| bodies[number].shape.is_curved())
+                || group.iter().all(|&number| is_along_axes[number]))
+        {
             group.iter().for_each(|&number| bodies[number].sampling = Sampling::Fitted);
         }
     }
     bodies
+}
+
+/// Lower corner of a box of the lattice that fills all of some bodies, if they have as many particles per
+/// cell; `leaf` is the edge of the coarsest leaves, m.
+fn lattice_of<'a, const D: usize>(
+    mut bodies: impl Iterator<Item = &'a Body<D>>,
+    leaf: f64,
+    space: &Space<D>,
+) -> Option<[f64; D]> {
+    let (domain, mut faces, mut particles) = (Aabb::new([0.0; D], space.size), Faces::default(), None);
+    let is_plane = bodies.all(|body| {
+        let per_cell = body.particles_per_cell;
+        *particles.get_or_insert(per_cell) == per_cell && body.shape.add_faces(&domain, &mut faces)
+    });
+    faces.lattice(leaf / particles_per_leaf(particles?)).filter(|_| is_plane)
 }
 
 pub(super) fn body<const D: usize>(
@@ -173,6 +210,7 @@ pub(super) fn body<const D: usize>(
         stage: stages::of_body(checks, body, file_of, path),
         particles_per_cell: body.particles_per_cell,
         sampling: sampling(checks, body, path)?,
+        lattice: [0.0; D],
         given,
         fed: None,
         stress: match &body.stress {

@@ -61,6 +61,9 @@ pub struct Body<const D: usize> {
     pub particles_per_cell: f64,
     /// Arrangement of its particles about the points of the lattice.
     pub sampling: Sampling<D>,
+    /// Lower corner of a box of the lattice, m, at most a box below that of the domain: there, unless the
+    /// faces of the body lie between the cells.
+    pub lattice: [f64; D],
     /// Stress at the start, if there is any.
     pub stress: Option<InitialStress>,
     /// Its particles, where the job gives them one by one; the shape then is a box about them.

@@ -282,8 +282,10 @@ pub struct Body {
     #[serde(default = "two")]
     #[schemars(range(min = 0.5, max = 8.0))]
     pub particles_per_cell: f64,
-    /// How particles lie. By default on the lattice; `fitted` for balls, cylinders, cones and what is made of
-    /// them, of elastic material, metal and clay, if `particles_per_cell` is a multiple of 0.25.
+    /// How particles lie. By default on the lattice; bodies of elastic material, metal and clay whose surface
+    /// lies off it have a lattice of their own, if whole boxes fill them on cells of one size, else they are
+    /// `fitted`, if `particles_per_cell` is a multiple of 0.25 (inclined plane faces in jobs with
+    /// `[[contact]]` only).
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sampling: Option<Sampling>,
     /// Number that chooses one of many arrangements of `jittered` and `poisson`; 0 by default. Runs that

@@ -11,8 +11,8 @@ use partition::comm::{Comm, Disagreement};
 use rayon::prelude::*;
 use rustc_hash::FxHashMap;
 
-use super::lattice::{coordinate, lattice_of};
-use super::parts::{edge_at_surface, has_parts, is_in_box};
+use super::lattice::Lattice;
+use super::parts::{has_parts, is_in_box, lattice_at_surface};
 use super::seed::{NumberedPlace, SeedError, lattice_places};
 use crate::exact_sum::ExactSum;
 use crate::geometry::surface::{Patch, Region, patches};
@@ -115,14 +115,18 @@ fn surface_shares<const D: usize>(
     let shares = tree.leaves().par_iter().map(|leaf| {
         let mut shares = Vec::new();
         for &body in &bodies {
-            let spacing = edge_at_surface(problem, leaf.level, &problem.bodies[body]);
-            if !is_near(problem, load, body, &problem.octant_box(leaf), spacing) {
+            let lattice = lattice_at_surface(problem, leaf.level, &problem.bodies[body]);
+            let places = lattice.places_in(&problem.octant_box(leaf));
+            // Boxes of lattices of their own stick out of their leaf.
+            let reach =
+                places.iter().fold(problem.octant_box(leaf), |all, index| all.hull(&lattice.cell(index)));
+            if !is_near(problem, load, body, &reach, lattice.edge) {
                 continue;
             }
-            let search = Search { problem, tree, load, new: &new, body, spacing };
-            for index in lattice_of(&problem.octant_box(leaf), spacing) {
-                let cell = search.cell(&index);
-                if is_near(problem, load, body, &cell, spacing) {
+            let search = Search { problem, tree, load, new: &new, body, lattice };
+            for index in places {
+                let cell = lattice.cell(&index);
+                if is_near(problem, load, body, &cell, lattice.edge) {
                     search.add(carried, &cell, &mut shares);
                 }
             }
@@ -154,15 +158,10 @@ struct Search<'a, const D: usize> {
     /// Bodies that come with this one.
     new: &'a [usize],
     body: usize,
-    spacing: f64,
+    lattice: Lattice<D>,
 }
 
 impl<const D: usize> Search<'_, D> {
-    fn cell(&self, index: &[u64; D]) -> Aabb<D> {
-        let corner = |offset: u64| index.map(|i| (i + offset) as f64 * self.spacing);
-        Aabb::new(corner(0), corner(1))
-    }
-
     /// Adds the shares of own particles in the surface in a box.
     fn add(&self, carried: &Carried<D>, cell: &Aabb<D>, shares: &mut Vec<Share<D>>) {
         let (problem, size) = (self.problem, self.problem.size());
@@ -175,7 +174,7 @@ impl<const D: usize> Search<'_, D> {
                     && others().all(|&other| problem.bodies[other].shape.distance(x) >= 0.0)
             },
             counts: &|x| {
-                let slack = ROUNDING * self.spacing;
+                let slack = ROUNDING * self.lattice.edge;
                 self.load.region.as_ref().is_none_or(|region| region.distance(x) <= slack)
             },
             // Distances to booleans are bounds, so one step may stop short of the surface.
@@ -200,7 +199,7 @@ impl<const D: usize> Search<'_, D> {
     /// Known leaf and place in the lattice of the particle that a piece of surface in a box belongs to.
     fn particle_of(&self, patch: &Patch<D>, cell: &Aabb<D>) -> Option<(usize, [u64; D])> {
         let size = patch.area.iter().map(|c| c * c).sum::<f64>().sqrt();
-        let step = 0.5 * self.spacing;
+        let step = 0.5 * self.lattice.edge;
         let inwards = (1..=STEPS).map(|k| {
             std::array::from_fn(|a| (f64::from(k) * step).mul_add(-patch.area[a] / size, patch.centre[a]))
         });
@@ -217,13 +216,13 @@ impl<const D: usize> Search<'_, D> {
             self.tree.locate(key)
         };
         let level = self.tree.leaves()[leaf_of(x)?].level;
-        let spacing = edge_at_surface(self.problem, level, &bodies[self.body]);
-        let index = x.map(|c| (c / spacing) as u64);
-        let centre = index.map(|i| coordinate(i, spacing));
+        let lattice = lattice_at_surface(self.problem, level, &bodies[self.body]);
+        let index = lattice.place_of(x);
+        let centre = lattice.centre(&index);
         let leaf = leaf_of(&centre).filter(|&leaf| self.tree.leaves()[leaf].level == level)?;
         let body = &bodies[self.body];
         if has_parts(self.problem, body) {
-            return is_in_box(&body.shape, &index, spacing).then_some((leaf, index));
+            return is_in_box(&body.shape, &lattice, &index).then_some((leaf, index));
         }
         let is_there = body.shape.contains(&centre)
             && (self.new.iter().take_while(|&&earlier| earlier < self.body))

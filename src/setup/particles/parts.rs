@@ -10,7 +10,7 @@
 //! the edge along their surface: a quarter of the error of a ring that breathes, with 32 cells over it. In
 //! space a ball of 16 cells to its radius would have 1.6 times as many particles. All follows from the body
 //! and the leaf alone.
-use super::lattice::{coordinate, lattice_of, spacing};
+use super::lattice::Lattice;
 use crate::geometry::{Aabb, Sampling, Shape, Side};
 use crate::job::problem::{Body, Problem};
 
@@ -78,9 +78,13 @@ pub(super) fn halves_at_surface<const D: usize>(problem: &Problem<D>, body: &Bod
     if D == 2 && has_parts(problem, body) && keeps_its_shape() { 2 } else { 1 }
 }
 
-/// Edge of the boxes along the surface of a body in leaves of a level, m.
-pub(super) fn edge_at_surface<const D: usize>(problem: &Problem<D>, level: u8, body: &Body<D>) -> f64 {
-    spacing(problem, level, body) / halves_at_surface(problem, body) as f64
+/// The boxes along the surface of a body in leaves of a level.
+pub(super) fn lattice_at_surface<const D: usize>(
+    problem: &Problem<D>,
+    level: u8,
+    body: &Body<D>,
+) -> Lattice<D> {
+    Lattice::of(problem, level, body).finer(halves_at_surface(problem, body))
 }
 
 /// Places of the boxes that a box is cut into, so many along each axis, in the order of their lattice.
@@ -90,8 +94,8 @@ fn children<const D: usize>(index: [u64; D], halves: u64) -> impl Iterator<Item 
 }
 
 /// Whether a body has a particle for a box of the lattice, its own or one that its part has joined.
-pub(super) fn is_in_box<const D: usize>(shape: &Shape<D>, index: &[u64; D], spacing: f64) -> bool {
-    of_box(shape, index, spacing).is_some()
+pub(super) fn is_in_box<const D: usize>(shape: &Shape<D>, lattice: &Lattice<D>, index: &[u64; D]) -> bool {
+    of_box(shape, lattice, index).is_some()
 }
 
 /// The particles of a body in a leaf, in the order of the lattice.
@@ -101,45 +105,39 @@ pub(super) fn of_leaf<const D: usize>(
     cell: &Aabb<D>,
     level: u8,
 ) -> Vec<Point<D>> {
-    let Some(spacing) = spacing_of_body(problem, body, level) else { return Vec::new() };
-    let mut points = of_boxes(&body.shape, lattice_of(cell, spacing).into_iter(), spacing);
+    let Some(lattice) = lattice_of_body(problem, body, level) else { return Vec::new() };
+    let mut points = of_boxes(&body.shape, &lattice, lattice.places_in(cell).into_iter());
     let cut: Vec<[u64; D]> =
         points.iter().filter(|point| point.part.is_some()).map(|point| point.index).collect();
-    join(&mut points, volume::<D>(spacing));
+    join(&mut points, lattice.volume());
     let halves = halves_at_surface(problem, body);
     if halves == 1 || cut.is_empty() {
         return points;
     }
     let (cut, mut points): (Vec<_>, Vec<_>) =
         points.into_iter().partition(|point| cut.binary_search(&point.index).is_ok());
-    let small = spacing / halves as f64;
+    let small = lattice.finer(halves);
     let mut places: Vec<[u64; D]> = cut.iter().flat_map(|point| point.places(halves)).collect();
     places.sort_unstable();
-    let mut parts = of_boxes(&body.shape, places.into_iter(), small);
-    join(&mut parts, volume::<D>(small));
+    let mut parts = of_boxes(&body.shape, &small, places.into_iter());
+    join(&mut parts, small.volume());
     points.extend(parts.into_iter().map(|point| {
-        let whole = Part { volume: volume::<D>(small), centre: point.x };
+        let whole = Part { volume: small.volume(), centre: point.x };
         Point { part: point.part.or(Some(whole)), halves, ..point }
     }));
     points.sort_by_key(|point| point.places(halves).next());
     points
 }
 
-/// Volume of a box of this edge, m³ (m² in the plane).
-fn volume<const D: usize>(edge: f64) -> f64 {
-    (0..D).fold(1.0, |volume, _| volume * edge)
-}
-
-/// The parts of a shape in boxes of this edge, one at each of some places, all in the order of the lattice.
+/// The parts of a shape in boxes at some places, all in the order of the lattice.
 fn of_boxes<const D: usize>(
     shape: &Shape<D>,
+    lattice: &Lattice<D>,
     places: impl Iterator<Item = [u64; D]>,
-    edge: f64,
 ) -> Vec<Point<D>> {
     let points = places.filter_map(|index| {
-        let part = of_box(shape, &index, edge)?;
-        let x = index.map(|i| coordinate(i, edge));
-        Some(Point { part, ..Point::at(index, x) })
+        let part = of_box(shape, lattice, &index)?;
+        Some(Point { part, ..Point::at(index, lattice.centre(&index)) })
     });
     points.collect()
 }
@@ -152,16 +150,17 @@ pub(super) fn likely_of_leaf<const D: usize>(
     cell: &Aabb<D>,
     level: u8,
 ) -> Vec<Point<D>> {
-    let Some(spacing) = spacing_of_body(problem, body, level) else { return Vec::new() };
+    let Some(lattice) = lattice_of_body(problem, body, level) else { return Vec::new() };
     let halves = halves_at_surface(problem, body);
-    let likely = lattice_of(cell, spacing).into_iter().flat_map(|index| {
-        let distance = || body.shape.distance(&index.map(|i| coordinate(i, spacing)));
-        let halves = if halves > 1 && distance().abs() < CUT * spacing { halves } else { 1 };
-        let edge = spacing / halves as f64;
+    let likely = lattice.places_in(cell).into_iter().flat_map(|index| {
+        let distance = || body.shape.distance(&lattice.centre(&index));
+        let is_cut = || body.shape.classify(&lattice.cell(&index)) == Side::Crosses;
+        let halves = if halves > 1 && distance().abs() < CUT * lattice.edge && is_cut() { halves } else { 1 };
+        let boxes = lattice.finer(halves);
         children(index, halves).filter_map(move |index| {
-            let x = index.map(|i| coordinate(i, edge));
+            let x = boxes.centre(&index);
             let outside = Part { volume: 0.0, centre: x };
-            (body.shape.distance(&x) < LIKELY * edge)
+            (body.shape.distance(&x) < LIKELY * boxes.edge)
                 .then(|| Point { part: (!body.shape.contains(&x)).then_some(outside), ..Point::at(index, x) })
         })
     });
@@ -169,17 +168,20 @@ pub(super) fn likely_of_leaf<const D: usize>(
     if likely.is_empty() { of_leaf(problem, body, cell, level) } else { likely }
 }
 
-/// Edge of the boxes of a body's lattice on a level, m; `None` where the body would be a single particle far
-/// smaller than its box.
-fn spacing_of_body<const D: usize>(problem: &Problem<D>, body: &Body<D>, level: u8) -> Option<f64> {
-    let (spacing, bounds) = (spacing(problem, level, body), body.shape.bounds());
-    (0..D).any(|a| bounds.upper[a] - bounds.lower[a] >= 0.5 * spacing).then_some(spacing)
+/// The lattice of a body on a level; `None` where the body would be a single particle far smaller than its
+/// box.
+fn lattice_of_body<const D: usize>(problem: &Problem<D>, body: &Body<D>, level: u8) -> Option<Lattice<D>> {
+    let (lattice, bounds) = (Lattice::of(problem, level, body), body.shape.bounds());
+    (0..D).any(|a| bounds.upper[a] - bounds.lower[a] >= 0.5 * lattice.edge).then_some(lattice)
 }
 
 /// The part of a shape in a box of the lattice: `None` if it has none, no part if it fills the box.
-fn of_box<const D: usize>(shape: &Shape<D>, index: &[u64; D], spacing: f64) -> Option<Option<Part<D>>> {
-    let corner = |offset: u64| index.map(|i| (i + offset) as f64 * spacing);
-    let cell = Aabb::new(corner(0), corner(1));
+fn of_box<const D: usize>(
+    shape: &Shape<D>,
+    lattice: &Lattice<D>,
+    index: &[u64; D],
+) -> Option<Option<Part<D>>> {
+    let cell = lattice.cell(index);
     match shape.classify(&cell) {
         Side::Outside => return None,
         Side::Inside => return Some(None),
@@ -191,7 +193,7 @@ fn of_box<const D: usize>(shape: &Shape<D>, index: &[u64; D], spacing: f64) -> O
         return None;
     }
     let inside = |a: usize| {
-        let slack = 1e-9 * spacing;
+        let slack = 1e-9 * lattice.edge;
         found.centre[a].clamp(cell.lower[a] + slack, cell.upper[a] - slack)
     };
     let part = Part { volume: found.volume, centre: std::array::from_fn(inside) };

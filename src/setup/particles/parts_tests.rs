@@ -136,7 +136,7 @@ fn small_parts_join_their_neighbours() {
     let (mut small, mut parts, mut joined) = (0, 0, 0);
     for leaf in leaves(&problem) {
         let points = of_leaf(&problem, &problem.bodies[0], &problem.octant_box(&leaf), leaf.level);
-        let edge = spacing(&problem, leaf.level, &problem.bodies[0]);
+        let edge = Lattice::of(&problem, leaf.level, &problem.bodies[0]).edge;
         for point in &points {
             let whole = (edge / point.halves as f64).powi(2);
             let volume = point.part.map_or(whole, |part| part.volume);
@@ -166,7 +166,7 @@ fn solids_in_the_plane_have_smaller_boxes_along_their_surface() {
         let halves = halves_at_surface(&problem, body);
         for leaf in leaves(&problem) {
             let points = of_leaf(&problem, body, &problem.octant_box(&leaf), leaf.level);
-            let edge = spacing(&problem, leaf.level, body);
+            let edge = Lattice::of(&problem, leaf.level, body).edge;
             let mut all: Vec<[u64; 2]> = points.iter().flat_map(|point| point.places(halves)).collect();
             for point in points {
                 // What is far from the rim has the boxes of the lattice.
@@ -206,9 +206,9 @@ fn rounding_of_faces_does_not_matter() {
     assert_eq!(make(1.5 - 1e-12), exact);
 }
 
-/// Which of these bodies are fitted without a word: shapes and materials ("rubber", "steel" or "sand") in a
-/// domain of 4 by 2 m.
-fn fitted(bodies: &[(&str, &str)]) -> Vec<bool> {
+/// A job with bodies of these shapes and materials ("rubber", "steel" or "sand") in a domain of 4 by 2 m, on
+/// cells of a quarter.
+fn with_bodies(bodies: &[(&str, &str)], rest: &str) -> Problem<2> {
     let bodies: String = (bodies.iter().enumerate())
         .map(|(i, (material, shape))| {
             format!("[[bodies]]\nname = \"{i}\"\nmaterial = \"{material}\"\nshape = {shape}\n")
@@ -219,23 +219,30 @@ fn fitted(bodies: &[(&str, &str)]) -> Vec<bool> {
         "version = 1\ndimension = 2\ntime = {{ end = 1 }}\ndomain = {{ size = [4, 2], root_edge = 1 }}\n\
          [[materials]]\nname = \"rubber\"\nmodel = \"hencky\"\n{elastic}\
          [[materials]]\nname = \"steel\"\nmodel = \"von_mises\"\nyield_stress = 1e4\n{elastic}\
-         [[materials]]\nname = \"sand\"\nmodel = \"drucker_prager\"\nfriction_angle = 30\n{elastic}{bodies}"
+         [[materials]]\nname = \"sand\"\nmodel = \"drucker_prager\"\nfriction_angle = 30\n{elastic}{bodies}{rest}"
     );
     let any = parse(&text, "test.toml".as_ref()).unwrap_or_else(|faults| panic!("{faults:?}"));
-    let problem: Problem<2> = any.try_into().unwrap_or_else(|_| panic!("wrong dimension"));
+    any.try_into().unwrap_or_else(|_| panic!("wrong dimension"))
+}
+
+/// Which of these bodies are fitted without a word.
+fn fitted(bodies: &[(&str, &str)]) -> Vec<bool> {
+    let problem = with_bodies(bodies, "");
     problem.bodies.iter().map(|body| matches!(body.sampling, Sampling::Fitted)).collect()
 }
 
 #[test]
-fn curved_solids_and_what_touches_them_are_fitted_without_a_word() {
-    let disc = r#"{ kind = "circle", centre = [0.5, 0.5], radius = 0.4 }"#;
+fn solids_off_the_lattice_and_what_touches_them_are_fitted_without_a_word() {
+    let disc = r#"{ kind = "circle", centre = [0.5, 0.5], radius = 0.375 }"#;
     let far = r#"{ kind = "circle", centre = [3, 0.5], radius = 0.4 }"#;
-    let floor = r#"{ kind = "box", min = [0, 0], max = [1, 0.1] }"#;
+    let floor = r#"{ kind = "box", min = [0, 0], max = [1, 0.125] }"#;
+    let thick = r#"{ kind = "box", min = [0, 0], max = [1, 0.15] }"#;
     let bed = r#"{ kind = "box", min = [2, 0], max = [4, 0.1] }"#;
     assert_eq!(fitted(&[("rubber", disc)]), [true]);
     assert_eq!(fitted(&[("steel", disc)]), [true]);
     assert_eq!(fitted(&[("sand", disc)]), [false]);
     assert_eq!(fitted(&[("rubber", floor)]), [false]);
+    assert_eq!(fitted(&[("rubber", thick)]), [true]);
     assert_eq!(fitted(&[("rubber", disc), ("steel", floor)]), [true, true]);
     // Boxes of 1 / 2.2 cells do not lie in one leaf each, so they are whole.
     let odd = format!("{floor}\nparticles_per_cell = 2.2");
@@ -245,4 +252,33 @@ fn curved_solids_and_what_touches_them_are_fitted_without_a_word() {
         fitted(&[("sand", bed), ("rubber", far), ("rubber", disc), ("rubber", floor)]),
         [false, false, true, true]
     );
+}
+
+/// Blocks that whole boxes fill, and that lie between the cells, have a lattice of their own: particles of
+/// one mass, whose boxes end at the faces.
+#[test]
+fn blocks_of_whole_boxes_have_them_wherever_they_lie() {
+    let block = r#"{ kind = "box", min = [0.53, 0.29], max = [1.53, 0.79] }"#;
+    let upon = r#"{ kind = "box", min = [0.78, 0.79], max = [1.28, 1.29] }"#;
+    for bodies in [&[("rubber", block)][..], &[("rubber", block), ("steel", upon)]] {
+        let problem = with_bodies(bodies, "");
+        let chunks = seeded(&problem);
+        let number: usize = chunks.iter().map(Chunk::len).sum();
+        assert_eq!(number, if bodies.len() == 1 { 32 } else { 48 });
+        let exact = 1000.0 * if bodies.len() == 1 { 0.5 } else { 0.75 };
+        let mass: f64 = chunks.iter().flat_map(|chunk| chunk.column(Layout::<2>::MASS)).sum();
+        assert!((mass / exact - 1.0).abs() < 1e-12, "{mass}");
+        let low =
+            |chunk: &Chunk<2>, p: usize, a: usize| chunk.position(p)[a] - chunk.column(Layout::<2>::HALF)[p];
+        for (a, face) in [0.53, 0.29].into_iter().enumerate() {
+            let all = chunks.iter().flat_map(|chunk| (0..chunk.len()).map(move |p| low(chunk, p, a)));
+            assert!((all.fold(f64::INFINITY, f64::min) - face).abs() < 1e-12);
+        }
+    }
+    // Cells of several sizes, a sampling by name and what flows ask for the lattice of the cells.
+    let region = "[[tree.regions]]\nlevel = 1\nshape = { kind = \"box\", min = [3, 0], max = [4, 1] }";
+    assert_eq!(with_bodies(&[("rubber", block)], region).bodies[0].lattice, [0.0; 2]);
+    assert_eq!(with_bodies(&[("sand", block)], "").bodies[0].lattice, [0.0; 2]);
+    let named = format!("{block}\nsampling = \"lattice\"");
+    assert_eq!(with_bodies(&[("rubber", &named)], "").bodies[0].lattice, [0.0; 2]);
 }

@@ -1,12 +1,12 @@
 //! Fills bodies with particles.
 //!
 //! In a leaf with cells of edge h a body gets the points of a lattice of spacing h / particles per cell,
-//! anchored at the lower corner of the domain. Leaf boxes are half-open, so every leaf makes its own points,
-//! on whichever rank it is, and no point is made twice. A body from a file has the particles of the file.
-//! Particles lie at these points or, by the sampling of their body, near them, within the same leaf and body.
-//! Where the surface of a fitted body cuts the box of a point, the particle is the part of the body in it
-//! (`parts.rs`).
-use super::lattice::{coordinate, first_at_or_after, for_lattice, spacing};
+//! anchored at the lower corner of the domain or at the faces of the body. Leaf boxes are half-open, so every
+//! leaf makes its own points, on whichever rank it is, and no point is made twice. A body from a file has the
+//! particles of the file. Particles lie at these points or, by the sampling of their body, near them, within
+//! the same leaf and body. Where the surface of a fitted body cuts the box of a point, the particle is the
+//! part of the body in it (`parts.rs`).
+use super::lattice::Lattice;
 use super::parts::{Point, halves_at_surface, has_parts, likely_of_leaf, of_leaf};
 use crate::geometry::{Aabb, Sampling, Side};
 use crate::job::problem::{Body, Problem};
@@ -110,7 +110,7 @@ pub fn fill_leaf<const D: usize>(
 ) -> Result<(), SeedError> {
     visit(problem, octant, problem.bodies_of_stage(stage), of_leaf, |index, points| {
         let body = &problem.bodies[index];
-        let spacing = spacing(problem, octant.level, body);
+        let spacing = Lattice::of(problem, octant.level, body).edge;
         let given = body.given.as_ref().map(|given| (given, given.in_box(&problem.octant_box(octant))));
         let whole: f64 = [spacing; D].iter().product();
         let setup = &problem.materials[body.material];
@@ -254,11 +254,7 @@ pub fn lattice_count<const D: usize>(problem: &Problem<D>, body: usize, cell: &A
     if let Some(given) = &problem.bodies[body].given {
         return given.in_box(cell).len() as u64;
     }
-    let spacing = spacing(problem, level, &problem.bodies[body]);
-    let along = |a: usize| {
-        first_at_or_after(cell.upper[a], spacing).saturating_sub(first_at_or_after(cell.lower[a], spacing))
-    };
-    (0..D).fold(1, |all, a| all.saturating_mul(along(a)))
+    Lattice::of(problem, level, &problem.bodies[body]).count_in(cell)
 }
 
 /// Not collective. Checks the number of particles of each body that comes with a stage, in all leaves of all
@@ -373,18 +369,18 @@ fn visit<const D: usize>(
     let mut points = Vec::new();
     for &(index, side) in &near {
         let body = &problem.bodies[index];
-        let spacing = spacing(problem, octant.level, body);
-        let index_at = |x: &[f64; D]| x.map(|c| (c / spacing) as u64);
+        let lattice = Lattice::of(problem, octant.level, body);
         points.clear();
         if let Some(given) = &body.given {
             let rows = given.in_box(&cell).into_iter();
-            points
-                .extend(rows.map(|p| given.chunk().position(p as usize)).map(|x| Point::at(index_at(&x), x)));
+            points.extend(
+                rows.map(|p| given.chunk().position(p as usize)).map(|x| Point::at(lattice.place_of(&x), x)),
+            );
         } else if side == Side::Crosses && has_parts(problem, body) {
             points = at_surface(problem, body, &cell, octant.level);
         } else {
-            for_lattice(&cell, spacing, |index| {
-                let x = index.map(|i| coordinate(i, spacing));
+            lattice.visit(&cell, |index| {
+                let x = lattice.centre(&index);
                 if side == Side::Inside || body.shape.contains(&x) {
                     points.push(Point::at(index, x));
                 }
@@ -393,7 +389,7 @@ fn visit<const D: usize>(
         let together = |other: usize| other != index && problem.come_together(index, other);
         for &(other, _) in near.iter().filter(|(other, _)| together(*other)) {
             // Two bodies in contact may both contain a point by rounding; it belongs to the first.
-            let rounding = -1e-9 * spacing;
+            let rounding = -1e-9 * lattice.edge;
             let neighbour = &problem.bodies[other];
             let mut overlap = None;
             points.retain(|point| {

@@ -2,7 +2,7 @@ use super::*;
 use crate::geometry::Shape;
 use crate::job::{AnyProblem, parse};
 use crate::setup::estimate::explicit::leaves;
-use crate::setup::particles::lattice::lattice_of;
+use crate::setup::particles::lattice::Lattice;
 use proptest::prelude::*;
 
 fn problem<const D: usize>(text: &str) -> Problem<D>
@@ -71,9 +71,9 @@ proptest! {
             made.extend((0..chunk.len()).map(|p| bits(chunk.position(p))));
         }
         made.sort_unstable();
-        let spacing = 0.25 / f64::from(1 << level) / per_cell;
-        let all = lattice_of(&Aabb::new([0.0; 2], [2.0, 1.0]), spacing);
-        let mut all: Vec<[f64; 2]> = all.iter().map(|index| index.map(|i| coordinate(i, spacing))).collect();
+        let lattice = Lattice { origin: [0.0; 2], edge: 0.25 / f64::from(1 << level) / per_cell };
+        let all = lattice.places_in(&Aabb::new([0.0; 2], [2.0, 1.0]));
+        let mut all: Vec<[f64; 2]> = all.iter().map(|index| lattice.centre(index)).collect();
         all.retain(|x| problem.bodies[0].shape.contains(x));
         let mut expected: Vec<[u64; 2]> = all.into_iter().map(bits).collect();
         expected.sort_unstable();
@@ -116,9 +116,9 @@ fn a_turning_body_moves_rigidly() {
 
 #[test]
 fn points_in_two_bodies_are_refused_and_adjacent_boxes_share_none() {
-    let first = body("a", "shape = { kind = \"box\", min = [5, -3], max = [5.3, -2.5] }");
-    let second =
-        body("b", "particles_per_cell = 3\nshape = { kind = \"box\", min = [5.3, -3], max = [6, -2.5] }");
+    let lattice = "sampling = \"lattice\"\nshape = { kind = \"box\", ";
+    let first = body("a", &format!("{lattice}min = [5, -3], max = [5.3, -2.5] }}"));
+    let second = body("b", &format!("particles_per_cell = 3\n{lattice}min = [5.3, -3], max = [6, -2.5] }}"));
     let mut problem = problem::<2>(&job(2, 0, &(first + &second)));
     assert!(seeded(&problem).is_ok());
 
@@ -128,7 +128,7 @@ fn points_in_two_bodies_are_refused_and_adjacent_boxes_share_none() {
     problem.bodies[1].shape = Shape::Box(wider);
     let error = seeded(&problem).unwrap_err();
     assert!(matches!(&error, SeedError::Overlap { first, second, .. } if first == "a" && second == "b"));
-    assert!(error.to_string().starts_with("test.toml:21:9: bodies[1].shape: found"), "{error}");
+    assert!(error.to_string().starts_with("test.toml:23:9: bodies[1].shape: found"), "{error}");
 }
 
 #[test]
