@@ -184,6 +184,7 @@ impl<const D: usize> Search<'_, D> {
                     std::array::from_fn(|a| f64::mul_add(-distance, normal[a], x[a]))
                 })
             },
+            normal: &|x| shape.gradient(x),
         };
         for patch in patches(&region, cell).iter().filter(|patch| carried.is_facing(&patch.area)) {
             if let Some((leaf, index)) = self.particle_of(patch, cell)

@@ -139,6 +139,7 @@ fn surface<const D: usize>(collider: &Collider<D>, extent: &[f64; D], root_edge:
             let (distance, normal) = (shape.distance(x), shape.gradient(x));
             std::array::from_fn(|a| distance.mul_add(-normal[a], x[a]))
         },
+        normal: &|x| shape.gradient(x),
     };
     let first: [i64; D] = std::array::from_fn(|a| (bounds.lower[a] / edge).floor() as i64);
     let number: [i64; D] =
