@@ -116,15 +116,13 @@ fn surface_shares<const D: usize>(
         let mut shares = Vec::new();
         for &body in &bodies {
             let lattice = lattice_at_surface(problem, leaf.level, &problem.bodies[body]);
-            let places = lattice.places_in(&problem.octant_box(leaf));
-            // Boxes of lattices of their own stick out of their leaf.
-            let reach =
-                places.iter().fold(problem.octant_box(leaf), |all, index| all.hull(&lattice.cell(index)));
-            if !is_near(problem, load, body, &reach, lattice.edge) {
+            let of_leaf = problem.octant_box(leaf);
+            // Boxes of a lattice of its own stick out of the leaf that holds their centres.
+            if !is_near(problem, load, body, &of_leaf.grown(0.5 * lattice.edge), lattice.edge) {
                 continue;
             }
             let search = Search { problem, tree, load, new: &new, body, lattice };
-            for index in places {
+            for index in lattice.places_in(&of_leaf) {
                 let cell = lattice.cell(&index);
                 if is_near(problem, load, body, &cell, lattice.edge) {
                     search.add(carried, &cell, &mut shares);
@@ -144,8 +142,7 @@ fn is_near<const D: usize>(
     cell: &Aabb<D>,
     spacing: f64,
 ) -> bool {
-    let slack = 1e-3 * spacing;
-    let grown = Aabb::new(cell.lower.map(|c| c - slack), cell.upper.map(|c| c + slack));
+    let grown = cell.grown(1e-3 * spacing);
     problem.bodies[body].shape.classify(&grown) == Side::Crosses
         && load.region.as_ref().is_none_or(|region| region.classify(&grown) != Side::Outside)
 }
