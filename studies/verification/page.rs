@@ -70,8 +70,19 @@ impl Page {
         &self.lines
     }
 
+    /// Keeps other programs of the suite from writing the page until the file is dropped.
+    fn lock(&self) -> std::fs::File {
+        let folder = self.path.parent().unwrap_or(Path::new("."));
+        crate::checked(std::fs::create_dir_all(folder));
+        let page = std::fs::OpenOptions::new().append(true).create(true).open(&self.path);
+        let page = crate::checked(page);
+        crate::checked(page.lock());
+        page
+    }
+
     /// Writes the page with a section that was measured and those others of `names` that it has.
     pub(crate) fn update(&self, names: &[&str], section: &str, (body, new): (String, Vec<Row>)) {
+        let _alone = self.lock();
         let old = std::fs::read_to_string(&self.path).unwrap_or_default();
         let table = old.lines().skip_while(|line| !line.starts_with("| ---")).skip(1).map_while(Row::read);
         let mut rows: Vec<Row> = table.filter(|row| self.lines.is_expected(row)).collect();
@@ -100,16 +111,10 @@ impl Page {
         for (name, body) in names.iter().filter_map(|name| Some((name, bodies.get(*name)?))) {
             text += &format!("\n<!-- section {name} -->\n{body}\n");
         }
-        checked_write(&self.path, &format!("{text}{REFERENCES}{}", self.lines.sources(&rows)));
+        text += &format!("{REFERENCES}{}", self.lines.sources(&rows));
+        crate::checked(std::fs::write(&self.path, text));
     }
 }
 
 /// Between the sections and the sources.
 const REFERENCES: &str = "\n## References\n\n";
-
-fn checked_write(path: &Path, text: &str) {
-    if let Some(folder) = path.parent() {
-        crate::checked(std::fs::create_dir_all(folder));
-    }
-    crate::checked(std::fs::write(path, text));
-}

@@ -2,7 +2,8 @@
 //!
 //! `studies/verification/run` builds and starts it.
 use std::path::PathBuf;
-use std::process::ExitCode;
+use std::process::{Command, ExitCode};
+use std::sync::Mutex;
 use std::time::Instant;
 
 use agimp::job::{AnyProblem, Problem, parse};
@@ -42,6 +43,9 @@ type Section = fn(&Comm, &mut page::Page);
 /// The page of the documentation.
 const PAGE: &str = "docs/verification.md";
 
+/// Sections of more than a tenth of the suite's time: started first, so that all end together.
+const LONG: [&str; 3] = ["collapse", "cost_of_rings", "rings"];
+
 /// What is asked for.
 struct Arguments {
     effort: Effort,
@@ -49,11 +53,13 @@ struct Arguments {
     /// Settings `KEY=VALUE` that all runs get beside their own, for trials.
     set: Vec<String>,
     page: PathBuf,
+    /// How many sections run at a time.
+    jobs: usize,
 }
 
 fn arguments() -> Arguments {
-    let mut found =
-        Arguments { effort: Effort::Full, only: Vec::new(), set: Vec::new(), page: PathBuf::from(PAGE) };
+    let (only, set) = Default::default();
+    let mut found = Arguments { effort: Effort::Full, only, set, page: PathBuf::from(PAGE), jobs: 1 };
     let mut all = std::env::args().skip(1);
     while let Some(argument) = all.next() {
         match argument.as_str() {
@@ -62,18 +68,47 @@ fn arguments() -> Arguments {
             "--only" => found.only.extend(all.next()),
             "--set" => found.set.extend(all.next()),
             "--page" => found.page = all.next().unwrap_or_default().into(),
-            other => {
-                panic!("found {other}; expected --quick, --full, --only NAME, --set KEY=VALUE or --page FILE")
-            }
+            "--jobs" => found.jobs = checked(all.next().unwrap_or_default().parse()),
+            other => panic!(
+                "found {other}; expected --quick, --full, --only NAME, --set KEY=VALUE, --page FILE or --jobs N"
+            ),
         }
     }
     found
 }
 
+/// Runs sections in programs of their own, so many at a time, the longest first; each writes its section of the page.
+fn side_by_side(names: &[&str], arguments: &Arguments) -> ExitCode {
+    let mut waiting = names.to_vec();
+    waiting.sort_by_key(|name| !LONG.contains(name));
+    let (waiting, start) = (Mutex::new(waiting.into_iter()), Instant::now());
+    let next = || waiting.lock().ok()?.next();
+    let own = checked(std::env::current_exe());
+    let effort = if arguments.effort == Effort::Full { "--full" } else { "--quick" };
+    let settings = arguments.set.iter().flat_map(|setting| ["--set", setting]);
+    let settings: Vec<&str> = settings.chain([effort]).collect();
+    let worker = || {
+        let sections = std::iter::from_fn(next);
+        let all_pass = |passes, name| {
+            let mut section = Command::new(&own);
+            section.args(["--only", name, "--page"]).arg(&arguments.page).args(&settings);
+            checked(section.status()).success() && passes
+        };
+        sections.fold(true, all_pass)
+    };
+    let passes = std::thread::scope(|scope| {
+        let workers: Vec<_> = (0..arguments.jobs).map(|_| scope.spawn(worker)).collect();
+        workers.into_iter().all(|worker| worker.join().unwrap_or(false))
+    });
+    println!("all sections: {:.0} s, {} at a time", start.elapsed().as_secs_f64(), arguments.jobs);
+    ExitCode::from(u8::from(!passes))
+}
+
 fn main() -> ExitCode {
-    let Arguments { effort, only, set, page: path } = arguments();
+    let arguments = arguments();
+    let Arguments { effort, only, set, page: path, jobs } = &arguments;
     checked(rayon::ThreadPoolBuilder::new().num_threads(1).use_current_thread().build_global());
-    let mut page = page::Page::new(&path, &checked(std::env::current_dir()));
+    let mut page = page::Page::new(path, &checked(std::env::current_dir()));
     // This program lies in `examples/`, beside it the solver.
     let own = checked(std::env::current_exe());
     let built = own.parent().and_then(|folder| folder.parent()).unwrap_or(&own);
@@ -82,8 +117,8 @@ fn main() -> ExitCode {
         top: checked(std::env::current_dir()),
         folder: std::env::temp_dir().join(format!("agimp_verification_{}", std::process::id())),
         ranks: 1,
-        effort,
-        set,
+        effort: *effort,
+        set: set.clone(),
     };
     let sections: [(&str, Section); 3] =
         [("wave", wave::section), ("advect", advect::section), ("spin", spin::section)];
@@ -92,6 +127,12 @@ fn main() -> ExitCode {
     let names: Vec<&str> = names.collect();
     if let Some(other) = only.iter().find(|wanted| !names.contains(&wanted.as_str())) {
         panic!("found --only {other}; expected one of {}", names.join(", "));
+    }
+    if *jobs > 1 {
+        return side_by_side(
+            &names.into_iter().filter(|name| is_wanted(name)).collect::<Vec<_>>(),
+            &arguments,
+        );
     }
     let writes = runs.is_full() && runs.set.is_empty();
     // After each section: what has been measured stays when the run is ended.
