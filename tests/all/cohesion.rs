@@ -115,6 +115,31 @@ fn stretched_bar_has_the_force_of_the_closed_form() {
     assert!(history.column("mass").iter().all(|&mass| mass == history.column("mass")[0]));
 }
 
+/// A bar of four cells over its width between grips 24 cells apart holds as a short one does: its force grows
+/// to a stretch of 3.6. Where only those particles are halved that are too wide themselves, it tears beside the
+/// grips by 3.2.
+#[test]
+fn long_bar_holds_beside_its_grips() {
+    let job = GRIPS
+        .replace("min = [-3.2, -0.4]", "min = [-5.2, -0.4]")
+        .replace("size = [6.4, 0.8]", "size = [10.4, 0.8]")
+        .replace("min = [-0.8, -0.15], max = [0.8, 0.15]", "min = [-1.6, -0.2], max = [1.6, 0.2]")
+        .replace("x / 0.6", "x / 1.2")
+        .replace("min = [-1.2, -0.35], max = [-0.6, 0.35]", "min = [-2, -0.35], max = [-1.2, 0.35]")
+        .replace("min = [0.6, -0.35], max = [1.2, 0.35]", "min = [1.2, -0.35], max = [2, 0.35]")
+        .replace("end = 1.5", "end = 3.13");
+    let (history, _) = finished(&job, "long");
+    let (time, mut before) = (history.column("time"), 0.0);
+    for stretch in [1.5, 2.0, 2.5, 3.0, 3.3, 3.6] {
+        let end = 1.2 * (stretch - 1.0);
+        let rows: Vec<usize> = (0..time.len()).filter(|&i| (time[i] - end).abs() < 0.04).collect();
+        let force = rows.iter().map(|&i| history.column("force_right_x")[i]).sum::<f64>() / rows.len() as f64;
+        println!("{stretch}: {force:.0} N");
+        assert!(force.abs() > 1.04 * before, "{stretch}: {force} N after {before} N");
+        before = force.abs();
+    }
+}
+
 /// A bar of four cells over its width between grips that part along a diagonal of the cells.
 fn diagonal() -> String {
     let half = 0.5_f64.sqrt();

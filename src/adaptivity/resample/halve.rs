@@ -5,10 +5,13 @@
 //! from node to node costs no strain, while the tension gives energy to it: for such modes the least
 //! eigenvalue of the stiffness is negative for any tension, and the body tears (`docs/design/resampling.md`).
 //! So an elastic particle whose box has become wider than [`WIDE`] cells along an axis, and is in tension
-//! along it, becomes two, half as wide along this axis alone. Their centres are where the stretch has carried
-//! those of the halves of the undeformed box, at `± V d`: along the axis itself, material that is stretched
-//! on a slant would move across. Its tag says so (see [`crate::particle::halvings`]). Mass, momentum and
-//! angular momentum are kept as [`pair::part`] says.
+//! along it, becomes two, half as wide along this axis alone, and with it all of its material in the
+//! leaf: beside grips, where the stretch changes within a cell, whole ones among halves tear. Their
+//! centres are where the stretch has carried those of the halves of the undeformed box, at `± V d`: along
+//! the axis itself, material that is stretched on a slant would move across. Its tag says so (see
+//! [`crate::particle::halvings`]). Mass, momentum and angular momentum are kept as [`pair::part`] says.
+use std::collections::BTreeMap;
+
 use super::mixture::{Group, mixtures};
 use super::split::displacement::{hand_displacement, stretched};
 use super::split::moments::spread_on_lattice;
@@ -64,9 +67,34 @@ fn greatest(undeformed: f64, cell: f64) -> f64 {
     (0.5 * WIDE * cell).max(GROWN * undeformed)
 }
 
+/// Least half widths (m) that undeformed boxes of halves in a leaf have, by material and axis.
+#[derive(Default)]
+struct Halved(BTreeMap<(u16, usize), f64>);
+
+impl Halved {
+    fn add(&mut self, of: (u16, usize), half: f64) {
+        let least = self.0.entry(of).or_insert(half);
+        *least = least.min(half);
+    }
+
+    /// Whether an undeformed box of a half width is wider than that of a half.
+    fn has_narrower(&self, of: (u16, usize), half: f64) -> bool {
+        self.0.get(&of).is_some_and(|least| half > 1.5 * least)
+    }
+}
+
+fn material<const D: usize>(chunk: &Chunk<D>, p: usize) -> u16 {
+    Tag::unpack(chunk.tags()[p]).material
+}
+
+/// Half width (m) below which halves of an undeformed half width become one.
+fn joined(undeformed: f64, cell: f64) -> f64 {
+    0.5 * NARROW * greatest(2.0 * undeformed, cell)
+}
+
 impl<const D: usize> Setting<'_, D> {
     fn is_elastic(&self, chunk: &Chunk<D>, p: usize) -> bool {
-        !self.scheme.materials[usize::from(Tag::unpack(chunk.tags()[p]).material)].is_plastic()
+        !self.scheme.materials[usize::from(material(chunk, p))].is_plastic()
     }
 }
 
@@ -83,7 +111,28 @@ fn wide_axis<const D: usize>(chunk: &Chunk<D>, setting: &Setting<D>, p: usize) -
     axis
 }
 
-/// Replaces elastic particles that have become too wide by two each, in their place. `book` gets the
+/// Axes along which others of the same material are to be halved with those that have become too wide.
+fn beside<const D: usize>(
+    chunk: &Chunk<D>,
+    setting: &Setting<D>,
+    wide: &[(u32, usize)],
+) -> Vec<(u32, usize)> {
+    let mut halved = Halved::default();
+    for &(p, axis) in wide {
+        halved.add((material(chunk, p as usize), axis), 0.5 * undeformed(chunk, p as usize)[axis]);
+    }
+    let is_other = |p: &usize| wide.binary_search_by_key(&(*p as u32), |(p, _)| *p).is_err();
+    let others = (0..chunk.len()).filter(is_other).filter(|&p| setting.is_elastic(chunk, p));
+    let others = others.filter_map(|p| {
+        let (material, half) = (material(chunk, p), undeformed(chunk, p));
+        let axis = (0..D).find(|&axis| halved.has_narrower((material, axis), half[axis]))?;
+        (ids::generation(chunk.ids()[p]) < ids::GENERATIONS).then_some((p as u32, axis))
+    });
+    others.collect()
+}
+
+/// Replaces elastic particles that have become too wide by two each, in their place, and with them those of
+/// the same material that are as wide from the start. `book` gets the
 /// kinetic energy that each split adds, J. Returns how many were replaced, and how many stayed since their
 /// identifiers have no room for another generation.
 pub(crate) fn halve<const D: usize>(
@@ -103,6 +152,8 @@ pub(crate) fn halve<const D: usize>(
     if wanted.is_empty() {
         return report;
     }
+    wanted.extend(beside(chunk, setting, &wanted));
+    wanted.sort_unstable();
     report.split = wanted.len() as u64;
     let (doubled, pairs) = pair::doubled(chunk, wanted.iter().map(|(p, _)| *p));
     *chunk = doubled;
@@ -123,7 +174,8 @@ pub(crate) fn halve<const D: usize>(
     report
 }
 
-/// Makes one again of halves that are in one chunk and no longer stretched, where their states are alike.
+/// Makes one again of halves that are in one chunk and no longer stretched, as none of their material there
+/// is, where their states are alike.
 /// `book` gets the kinetic energy that each merge removes, J.
 pub(crate) fn rejoin<const D: usize>(
     chunk: &mut Chunk<D>,
@@ -156,6 +208,18 @@ pub(crate) fn rejoin<const D: usize>(
     report
 }
 
+/// Halves of a chunk that are still too wide for one.
+fn still_wide<const D: usize>(chunk: &Chunk<D>, halves: impl Iterator<Item = usize>, cell: f64) -> Halved {
+    let mut wide = Halved::default();
+    for p in halves {
+        let (tag, half, undeformed) = (chunk.tags()[p], half_widths(chunk, p), undeformed(chunk, p));
+        let axes = (0..D).filter(|&axis| halvings::along(tag, axis) > 0);
+        axes.filter(|&axis| half[axis] >= joined(undeformed[axis], cell))
+            .for_each(|axis| wide.add((material(chunk, p), axis), undeformed[axis]));
+    }
+    wide
+}
+
 /// Pairs of halves that may become one, with their level, by identifier.
 fn narrow_pairs<const D: usize>(chunk: &Chunk<D>, setting: &Setting<D>) -> Vec<(u8, Group)> {
     let plain = |p: u32| merge_backoff::plain(chunk.tags()[p as usize]);
@@ -168,6 +232,7 @@ fn narrow_pairs<const D: usize>(chunk: &Chunk<D>, setting: &Setting<D>) -> Vec<(
         })
         .collect();
     halves.sort_unstable();
+    let wide = still_wide(chunk, halves.iter().map(|(_, _, p)| *p as usize), setting.cell());
     let pairs = halves.chunk_by(|a, b| (a.0, a.1) == (b.0, b.1)).filter(|pair| pair.len() == 2);
     let narrow = pairs.filter_map(|pair| {
         let (parent, tag, members) = (pair[0].0, pair[0].1, [pair[0].2, pair[1].2]);
@@ -178,8 +243,10 @@ fn narrow_pairs<const D: usize>(chunk: &Chunk<D>, setting: &Setting<D>) -> Vec<(
         let share = |a: usize| (y[a] - x[a]).abs() / (half[a] + other[a]);
         let halved = (0..D).filter(|&a| halvings::along(tag, a) > 0);
         let axis = halved.max_by(|&a, &b| share(a).total_cmp(&share(b)))?;
-        let limit = NARROW * greatest(2.0 * undeformed[0][axis], setting.cell());
-        let is_narrow = 2.0 * half[axis].max(other[axis]) < limit;
+        let undeformed = undeformed[0][axis];
+        let of = (material(chunk, members[0] as usize), axis);
+        let is_narrow = half[axis].max(other[axis]) < joined(undeformed, setting.cell())
+            && !wide.has_narrower(of, 2.0 * undeformed);
         let group = Group { rejoined: Some(axis), ..Group::new(members.to_vec(), parent, true) };
         is_narrow.then_some((Tag::unpack(tag).level, group))
     });

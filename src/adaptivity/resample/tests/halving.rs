@@ -145,3 +145,23 @@ fn only_what_is_drawn_is_halved() {
     assert_eq!([halved(&mut more).0, halved(&mut more).0, halved(&mut more).0], [number, 2 * number, 0]);
     assert!(more.tags().iter().all(|&tag| halvings::along(tag, 0) == 2 && halvings::along(tag, 1) == 0));
 }
+
+/// Where one is halved, all of its material in the leaf are, and none is joined before all may be.
+#[test]
+fn particles_of_a_leaf_are_halved_together() {
+    let materials = materials();
+    let scheme = Scheme { has_halves: true, ..scheme(&materials, Transfer::Apic) };
+    let setting = setting::<2>(&scheme, 1);
+    let (drawn, mut chunk) = (drawn::<2>(5, 0, 1.5), drawn::<2>(5, 0, 1.1));
+    let (number, flows) = (chunk.len(), 1);
+    set_matter(&mut chunk, 4, elastic(&drawn, 4), [0.0; HISTORIES]);
+    chunk.tags_mut()[flows] = Tag { material: 1, ..Tag::unpack(chunk.tags()[flows]) }.pack();
+    assert_eq!(halve(&mut chunk, &setting, &mut |_| ()).split, number as u64 - 1);
+    assert_eq!(halve(&mut chunk, &setting, &mut |_| ()).split, 0);
+    assert_eq!(rejoin(&mut chunk, &setting, &OPEN, &mut |_| ()).merged, 0, "some are still too wide");
+    for p in 0..chunk.len() {
+        set_matter(&mut chunk, p, [1.0, 1.0, 1.0, 0.0, 0.0, 0.0], [0.0; HISTORIES]);
+    }
+    assert_eq!(rejoin(&mut chunk, &setting, &OPEN, &mut |_| ()).merged, number as u64 - 1);
+    assert_eq!(chunk.len(), number);
+}
