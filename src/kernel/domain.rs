@@ -311,7 +311,8 @@ fn is_far<V: Vector, const D: usize>(stretches: &[V; D], scheme: &Scheme, max_st
 }
 
 /// From stretches to half widths, where particles of elastic materials have been halved or are stretched far.
-/// The bounds are those of the whole: parts of a wide box are narrow. A call, so that the kernels keep their
+/// The bounds are those of the whole, as parts of a wide box are narrow, and those of what has torn would
+/// be slivers, whose stable step is far below that of the cells. A call, so that the kernels keep their
 /// registers for what is usual.
 #[cold]
 #[inline(never)]
@@ -332,7 +333,7 @@ fn far_stretched<const D: usize>(
             false => ([1.0; D], 1.0),
         };
         for (stretch, shape) in stretches.iter_mut().zip(shape) {
-            let own = (shape * stretch[lane].max(min_stretch)).min(whole * most);
+            let own = (shape * stretch[lane]).max(whole * min_stretch).min(whole * most);
             stretch[lane] = original[lane] * own;
         }
     }

@@ -140,6 +140,29 @@ fn long_bar_holds_beside_its_grips() {
     }
 }
 
+/// A bar whose law softens parts, and the run goes on to its end, with what is left of the bar as it was: all of
+/// its mass, no energy from nowhere, and particles within a few times those that it had when it parted.
+#[test]
+fn bar_that_parts_runs_to_its_end() {
+    let (history, told) = finished(&GRIPS.replace("neo_hookean", "hencky"), "parted");
+    assert!(
+        told.contains("body \"bar\" is in ") && told.contains("hencky, beyond a stretch of 2.7"),
+        "{told}"
+    );
+    let energy = |row: usize| {
+        ["kinetic_energy", "elastic_energy"].iter().map(|name| history.column(name)[row]).sum::<f64>()
+    };
+    let rows = history.column("time").len();
+    let parted = (0..rows).max_by(|&a, &b| energy(a).total_cmp(&energy(b))).expect("a row");
+    let (time, particles) = (history.column("time"), history.column("particles"));
+    println!("parted at {} s with {} J, ends with {} J", time[parted], energy(parted), energy(rows - 1));
+    println!("{} particles, then {}", particles[parted], particles[rows - 1]);
+    assert!((0.6..1.2).contains(&time[parted]) && time[rows - 1] > 1.49);
+    assert!(energy(rows - 1) < 0.8 * energy(parted));
+    assert!(particles[rows - 1] < 8.0 * particles[parted]);
+    assert!(history.column("mass").iter().all(|&mass| mass == history.column("mass")[0]));
+}
+
 /// A bar of four cells over its width between grips that part along a diagonal of the cells.
 fn diagonal() -> String {
     let half = 0.5_f64.sqrt();

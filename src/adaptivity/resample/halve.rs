@@ -28,6 +28,8 @@ const WIDE: f64 = 0.6;
 const GROWN: f64 = 2.0 * WIDE;
 /// Two halves become one where the box of this is narrower than so much of the width at which it was halved.
 const NARROW: f64 = 0.9;
+/// Stretch beyond which a body has torn: its strands stretch without end, and halves would not mend that.
+const TORN: f64 = 8.0;
 
 /// A bound on the half widths (m) of the boxes of elastic particles in a chunk that are stretched; 0 if none
 /// is stretched enough to be halved. Particles that flow may be taken for such.
@@ -60,6 +62,11 @@ pub(crate) fn half_widths<const D: usize>(chunk: &Chunk<D>, p: usize) -> [f64; D
 fn undeformed<const D: usize>(chunk: &Chunk<D>, p: usize) -> [f64; D] {
     let [half] = chunk.read(Layout::<D>::HALF, p);
     halvings::shape::<D>(chunk.tags()[p]).map(|shape| half * shape)
+}
+
+/// Whether the box of a particle is that of a strand between parts that have torn, along an axis.
+fn has_torn(half: f64, undeformed: f64) -> bool {
+    half > TORN * undeformed
 }
 
 /// Half width (m) at which a box of an undeformed half width is halved, on cells of edge `cell`, m.
@@ -104,7 +111,8 @@ fn wide_axis<const D: usize>(chunk: &Chunk<D>, setting: &Setting<D>, p: usize) -
     let (mut most, mut axis) = (1.0, None);
     for a in 0..D {
         let excess = half[a] / greatest(undeformed[a], setting.cell());
-        if excess > most && chunk.column(Layout::<D>::STRESS + a)[p] > 0.0 {
+        let is_drawn = chunk.column(Layout::<D>::STRESS + a)[p] > 0.0 && !has_torn(half[a], undeformed[a]);
+        if excess > most && is_drawn {
             (most, axis) = (excess, Some(a));
         }
     }
@@ -132,9 +140,9 @@ fn beside<const D: usize>(
 }
 
 /// Replaces elastic particles that have become too wide by two each, in their place, and with them those of
-/// the same material that are as wide from the start. `book` gets the
-/// kinetic energy that each split adds, J. Returns how many were replaced, and how many stayed since their
-/// identifiers have no room for another generation.
+/// the same material that are as wide from the start. `book` gets the kinetic energy that each split adds, J.
+/// Returns how many were replaced, and how many stayed since their identifiers have no room for another
+/// generation.
 pub(crate) fn halve<const D: usize>(
     chunk: &mut Chunk<D>,
     setting: &Setting<D>,
@@ -215,6 +223,7 @@ fn still_wide<const D: usize>(chunk: &Chunk<D>, halves: impl Iterator<Item = usi
         let (tag, half, undeformed) = (chunk.tags()[p], half_widths(chunk, p), undeformed(chunk, p));
         let axes = (0..D).filter(|&axis| halvings::along(tag, axis) > 0);
         axes.filter(|&axis| half[axis] >= joined(undeformed[axis], cell))
+            .filter(|&axis| !has_torn(half[axis], undeformed[axis]))
             .for_each(|axis| wide.add((material(chunk, p), axis), undeformed[axis]));
     }
     wide

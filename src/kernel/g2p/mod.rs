@@ -18,6 +18,7 @@
 //! | this | the sweep over the particles of a bin, and their advance |
 //! | `gathered` | the sums over nodes |
 //! | [`fill`] | remedies that keep fluids in their volume |
+//! | `steep` | a bound on rates of elastic particles that are alone |
 //! | [`leavers`], [`rates`], [`booked`] | particles that leave; rates of deformation; sums for the history |
 use self::booked::Booked;
 use self::fill::Filling;
@@ -39,6 +40,7 @@ pub mod fill;
 mod gathered;
 pub mod leavers;
 pub mod rates;
+mod steep;
 
 /// Memory reused from bin to bin, as setting it up is slow.
 pub struct Scratch<const D: usize> {
@@ -343,8 +345,22 @@ impl Advance<'_> {
             (Transfer::Apic, Some(wall)) => wall.kept_affine_velocity(&moved),
             _ => None,
         };
+        let flows = || domain::plastic_lanes(|| index, scheme);
+        let mut added = if dilation.is_empty() { zero } else { batch.values(dilation) };
+        let mut hoop = if is_ring { plain[2] } else { zero };
+        let mut affine_kept = None;
+        if !scheme.is_all_plastic {
+            affine_kept = steep::Rate { gradient: &gradient, added, hoop }.kept(step, flows);
+        }
+        if let Some(kept) = affine_kept {
+            gradient = gradient.map(|row| row.map(|rate| rate * kept));
+            (added, hoop) = (added * kept, hoop * kept);
+        }
         for k in 0..D {
-            let affine = V::columns(&sums.affine[k]);
+            let mut affine = V::columns(&sums.affine[k]);
+            if let Some(kept) = affine_kept {
+                affine = affine.map(|affine| affine * kept);
+            }
             for i in 0..D {
                 let value = match (scheme.transfer, kept) {
                     (Transfer::Apic, Some(kept)) => affine[i] * kept[k],
@@ -354,18 +370,13 @@ impl Advance<'_> {
                 batch.store(tile, Layout::<D>::AFFINE + D * i + k, value);
             }
         }
-        let plastic = domain::plastic_lanes(|| index, scheme) != 0;
+        let plastic = flows() != 0;
         if !dilation.is_empty() {
-            let added: V = batch.values(dilation);
             (0..D).for_each(|i| gradient[i][i] += added);
         }
         let mut trial = strained(&elastic, &gradient, step);
-        let mut hoop = zero;
         if is_ring {
-            hoop = plain[2];
-            if !dilation.is_empty() {
-                hoop += batch.values(dilation);
-            }
+            hoop += added;
             let stretch = hoop.mul_add(step, V::splat(1.0));
             trial[2] = stretch * stretch * elastic[2];
         }

@@ -165,3 +165,20 @@ fn particles_of_a_leaf_are_halved_together() {
     assert_eq!(rejoin(&mut chunk, &setting, &OPEN, &mut |_| ()).merged, number as u64 - 1);
     assert_eq!(chunk.len(), number);
 }
+
+/// Strands of what has torn are not halved, and do not keep the rest from being joined.
+#[test]
+fn what_has_torn_is_left_as_it_is() {
+    let materials = materials();
+    let scheme = Scheme { has_halves: true, ..scheme(&materials, Transfer::Apic) };
+    let setting = setting::<2>(&scheme, 1);
+    let (mut torn, mut chunk) = (drawn::<2>(5, 0, 12.0), drawn::<2>(5, 0, 1.5));
+    let number = chunk.len();
+    assert_eq!(halve(&mut torn, &setting, &mut |_| ()).split, 0);
+    assert_eq!(halve(&mut chunk, &setting, &mut |_| ()).split, number as u64);
+    for p in 0..chunk.len() {
+        let elastic = if p < 2 { elastic(&torn, 0) } else { [1.0, 1.0, 1.0, 0.0, 0.0, 0.0] };
+        set_matter(&mut chunk, p, elastic, [0.0; HISTORIES]);
+    }
+    assert_eq!(rejoin(&mut chunk, &setting, &OPEN, &mut |_| ()).merged, number as u64 - 1);
+}
