@@ -2,9 +2,10 @@
 //!
 //! Where a body has torn, elastic particles are alone in their cells. As one crosses a node its B stays, but
 //! D falls to the second moment of its box, so that `∇v = B D⁻¹` grows. With `Δt |∇v| > 1` the factor
-//! `1 + Δt ∇v` turns its strain inside out, by more in each step, until b is no number. Neighbours do not
-//! move against each other at such rates, as the Courant number bounds their speeds. So rates of elastic
-//! particles, and their affine matrix with them, are at most [`MOST`] in a step; momentum stays as it is.
+//! `1 + Δt ∇v` turns its strain inside out, by more in each step, until b is no number. The Courant number
+//! keeps neighbours below such rates, but where bodies meet far above their speed of sound. So rates of
+//! elastic particles, and their affine matrix with them, are at most [`MOST`] in a step; momentum stays as
+//! it is.
 use crate::simd::{Vector, VectorMask};
 
 /// Greatest component of `Δt ∇v`.
