@@ -128,7 +128,7 @@ impl<'a, const D: usize> Resampling<'a, D> {
 
     /// Whether particle `p` is to be split where it enters a leaf of a level: it was made for a coarser one.
     pub fn splits_in(&self, chunk: &Chunk<D>, p: usize, level: u8) -> bool {
-        Tag::unpack(chunk.tags()[p]).level < level && ids::generation(chunk.ids()[p]) < ids::GENERATIONS
+        Tag::unpack(chunk.tags()[p]).level < level && ids::has_room(chunk.ids()[p])
     }
 }
 
@@ -157,7 +157,7 @@ pub fn needs_split<const D: usize>(chunk: &Chunk<D>, setting: &Setting<D>, stret
             half[p].iter().any(|&half| half > greatest)
         };
         if tag.level < setting.level || half.as_ref().is_some_and(too_wide) {
-            match ids::generation(id) < ids::GENERATIONS {
+            match ids::has_room(id) {
                 true => wanted.which.push(p as u32),
                 false => wanted.refused += 1,
             }

@@ -6,7 +6,8 @@
 //! eigenvalue of the stiffness is negative for any tension, and the body tears (`docs/design/resampling.md`).
 //! So an elastic particle whose box has become wider than [`WIDE`] cells along an axis, and is in tension
 //! along it, becomes two, half as wide along this axis alone, and with it all of its material in the
-//! leaf: beside grips, where the stretch changes within a cell, whole ones among halves tear. Their
+//! leaf that is at least [`SLACK`] as wide: beside grips, where the stretch changes within a cell, whole ones
+//! among halves tear. Their
 //! centres are where the stretch has carried those of the halves of the undeformed box, at `± V d`: along
 //! the axis itself, material that is stretched on a slant would move across. Its tag says so (see
 //! [`crate::particle::halvings`]). Mass, momentum and angular momentum are kept as [`pair::part`] says.
@@ -28,6 +29,9 @@ const WIDE: f64 = 0.6;
 const GROWN: f64 = 2.0 * WIDE;
 /// Two halves become one where the box of this is narrower than so much of the width at which it was halved.
 const NARROW: f64 = 0.9;
+/// Those that are narrower than so much of the width at which they are halved are not halved with others, nor
+/// kept from becoming one by others.
+const SLACK: f64 = 0.5;
 /// Stretch beyond which a body has torn: its strands stretch without end, and halves would not mend that.
 const TORN: f64 = 8.0;
 
@@ -132,9 +136,12 @@ fn beside<const D: usize>(
     let is_other = |p: &usize| wide.binary_search_by_key(&(*p as u32), |(p, _)| *p).is_err();
     let others = (0..chunk.len()).filter(is_other).filter(|&p| setting.is_elastic(chunk, p));
     let others = others.filter_map(|p| {
-        let (material, half) = (material(chunk, p), undeformed(chunk, p));
-        let axis = (0..D).find(|&axis| halved.has_narrower((material, axis), half[axis]))?;
-        (ids::generation(chunk.ids()[p]) < ids::GENERATIONS).then_some((p as u32, axis))
+        let (material, half, undeformed) = (material(chunk, p), half_widths(chunk, p), undeformed(chunk, p));
+        let axis = (0..D).find(|&axis| {
+            halved.has_narrower((material, axis), undeformed[axis])
+                && half[axis] > SLACK * greatest(undeformed[axis], setting.cell())
+        })?;
+        ids::has_room(chunk.ids()[p]).then_some((p as u32, axis))
     });
     others.collect()
 }
@@ -152,7 +159,7 @@ pub(crate) fn halve<const D: usize>(
     let mut wanted = Vec::new();
     for p in (0..chunk.len()).filter(|&p| setting.is_elastic(chunk, p)) {
         let Some(axis) = wide_axis(chunk, setting, p) else { continue };
-        match ids::generation(chunk.ids()[p]) < ids::GENERATIONS {
+        match ids::has_room(chunk.ids()[p]) {
             true => wanted.push((p as u32, axis)),
             false => report.refused += 1,
         }
@@ -252,10 +259,11 @@ fn narrow_pairs<const D: usize>(chunk: &Chunk<D>, setting: &Setting<D>) -> Vec<(
         let share = |a: usize| (y[a] - x[a]).abs() / (half[a] + other[a]);
         let halved = (0..D).filter(|&a| halvings::along(tag, a) > 0);
         let axis = halved.max_by(|&a, &b| share(a).total_cmp(&share(b)))?;
-        let undeformed = undeformed[0][axis];
+        let (undeformed, most) = (undeformed[0][axis], half[axis].max(other[axis]));
         let of = (material(chunk, members[0] as usize), axis);
-        let is_narrow = half[axis].max(other[axis]) < joined(undeformed, setting.cell())
-            && !wide.has_narrower(of, 2.0 * undeformed);
+        let is_narrow = most < joined(undeformed, setting.cell())
+            && (most < SLACK * joined(undeformed, setting.cell())
+                || !wide.has_narrower(of, 2.0 * undeformed));
         let group = Group { rejoined: Some(axis), ..Group::new(members.to_vec(), parent, true) };
         is_narrow.then_some((Tag::unpack(tag).level, group))
     });

@@ -31,6 +31,11 @@ pub fn generation(id: u64) -> u32 {
     (id >> GENERATION_SHIFT) as u32
 }
 
+/// Whether there is room for another generation.
+pub fn has_room(id: u64) -> bool {
+    generation(id) < GENERATIONS
+}
+
 /// The number that seeding, or a merge of strangers, gave to the oldest ancestor.
 pub fn root<const D: usize>(id: u64) -> u64 {
     id & (roots(D) - 1)
@@ -43,9 +48,8 @@ pub fn highest_root<const D: usize>(chunk: &Chunk<D>) -> Option<u64> {
 
 /// Identifier of child `number` (below `2^D`); `None` if there is no room for another generation.
 pub fn child<const D: usize>(id: u64, number: usize) -> Option<u64> {
-    let generation = generation(id);
-    let path = (number as u64) << (root_bits(D) + generation * D as u32);
-    (generation < GENERATIONS).then(|| (id | path) + (1 << GENERATION_SHIFT))
+    let path = (number as u64) << (root_bits(D) + generation(id) * D as u32);
+    has_room(id).then(|| (id | path) + (1 << GENERATION_SHIFT))
 }
 
 /// Identifier of the parent and the number among its children; `None` for generation 0.

@@ -82,7 +82,7 @@ pub(crate) fn close_gaps<const D: usize>(
             return None;
         }
         let (axis, direction) = longest(chunk, setting, *p, gap.column)?;
-        let is_wide = 2.0 * axis > gap.cells * cell && ids::generation(chunk.ids()[*p]) < ids::GENERATIONS;
+        let is_wide = 2.0 * axis > gap.cells * cell && ids::has_room(chunk.ids()[*p]);
         is_wide.then_some((*p as u32, axis, direction))
     };
     let wanted: Vec<(u32, f64, [f64; D])> = (0..chunk.len()).filter_map(|p| wanted(&p)).collect();

@@ -43,7 +43,7 @@ pub fn split<const D: usize>(
     let mut listed = which.iter().enumerate().peekable();
     for (p, &id) in (0..).zip(chunk.ids()) {
         match listed.next_if(|&(_, &listed)| listed == p) {
-            Some(_) if ids::generation(id) >= ids::GENERATIONS => report.refused += 1,
+            Some(_) if !ids::has_room(id) => report.refused += 1,
             Some((place, _)) => {
                 families.push((source.len(), place));
                 source.extend(std::iter::repeat_n(p, (1 << D) - 1));
