@@ -3,7 +3,7 @@
 //! | file | what it holds |
 //! |---|---|
 //! | `bytes` | the bytes of a job file |
-//! | `source`, `unclosed` | the tree of values; brackets and quotes that are not closed |
+//! | `source`, `unclosed`, `syntax` | the tree of values; brackets and quotes that are not closed; other slips |
 //! | `include`, `included` | files that are part of a job, and one of them |
 //! | `settings` | values that are set from outside |
 //! | `structure` | keys, types and ranges against the schema |
@@ -15,4 +15,5 @@ pub(super) mod included;
 pub(super) mod settings;
 pub(super) mod source;
 pub(super) mod structure;
+mod syntax;
 mod unclosed;

@@ -1,6 +1,6 @@
 //! The text of a job file as a tree of values with their places.
 use super::error::QUOTED;
-use super::unclosed;
+use super::{syntax, unclosed};
 use crate::text::{excerpt, written};
 use std::borrow::Cow;
 use std::fmt::Write as _;
@@ -76,7 +76,9 @@ impl Node {
         let table = DeTable::parse(text).map_err(|error| {
             let end = text.len();
             let span = error.span().unwrap_or(end..end);
-            unclosed::find(text, span.start).unwrap_or_else(|| (span, error.message().to_owned()))
+            unclosed::find(text, span.start)
+                .or_else(|| syntax::explain(text, span.start))
+                .unwrap_or_else(|| (span, error.message().to_owned()))
         })?;
         let value = from_table(table.into_inner())?;
         Ok(Self { span: 0..0, key_span: 0..0, value })
