@@ -120,7 +120,7 @@ fn stretch<const D: usize>(first: &Grip<D>, second: &Grip<D>) -> f64 {
 fn grips<const D: usize>(problem: &Problem<D>, body: &Body<D>) -> Vec<Grip<D>> {
     let own = body.shape.bounds();
     let mut grips = Vec::new();
-    for collider in problem.colliders.iter().filter(|c| c.acts_on_nodes() && c.free().is_none()) {
+    for collider in problem.colliders.iter().filter(|c| c.free().is_none()) {
         let bounds = collider.shape.bounds();
         let common = bounds.intersection(&own);
         let meets = |budget: &mut usize| {
