@@ -315,7 +315,7 @@ impl<'a, const D: usize> Run<'a, D> {
                 .map(|(bound, unit)| quantity(bound, unit));
             self.recorder.warning(&format!(
                 "no equilibrium by the end {what}, t = {time}: {way}; expected at most {speed} and {acceleration}. Where stops go on and these do not \
-                 fall, particles that cross cells keep them up: expect no less, or use finer cells"
+                 fall, particles that cross cells keep them up: expect no less, or use finer cells; what has still to fall is stopped with the rest"
             ));
         }
     }

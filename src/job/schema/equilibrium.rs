@@ -4,7 +4,8 @@ use serde::{Deserialize, Serialize};
 
 /// The way to equilibrium, by kinetic damping: whenever the kinetic energy has passed a peak, all velocities
 /// are set to 0. The run ends at rest, once both bounds hold, or at `time.end`. Columns of `history.csv` show
-/// the last peak, the last unbalanced force, and how often velocities were set to 0.
+/// the last peak, the last unbalanced force, and how often velocities were set to 0. What has still to fall
+/// is stopped with the rest, and hardly moves: let it come down in a stage before, without `equilibrium`.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Equilibrium {
