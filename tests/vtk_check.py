@@ -9,8 +9,13 @@ import json
 import os
 import sys
 
-import vtk
-from vtk.util.numpy_support import vtk_to_numpy
+# Module by module: "import vtk" also loads those that draw, which need libraries that small systems lack.
+from vtkmodules.util.numpy_support import vtk_to_numpy
+from vtkmodules.util.vtkConstants import VTK_STRING
+from vtkmodules.vtkCommonCore import vtkVersion
+from vtkmodules.vtkCommonDataModel import vtkCellTypes, vtkHyperTreeGridNonOrientedCursor
+from vtkmodules.vtkIOHDF import vtkHDFReader
+from vtkmodules.vtkIOXML import vtkXMLHyperTreeGridReader
 
 
 def arrays(attributes):
@@ -29,22 +34,22 @@ def arrays(attributes):
 
 def read(path):
     errors = []
-    reader = vtk.vtkHDFReader()
+    reader = vtkHDFReader()
     if not reader.CanReadFile(path):
         raise SystemExit(f"{path}: VTK cannot read this file")
     observer = lambda *args: errors.append(str(args[-1]))
-    observer.CallDataType = vtk.VTK_STRING
+    observer.CallDataType = VTK_STRING
     reader.AddObserver("ErrorEvent", observer)
     reader.SetFileName(path)
     reader.Update()
     if errors:
         raise SystemExit(f"{path}: {errors[0]}")
     grid = reader.GetOutput()
-    types = vtk.vtkCellTypes()
+    types = vtkCellTypes()
     grid.GetCellTypes(types)
     return {
         "file": path,
-        "vtk": vtk.vtkVersion.GetVTKVersion(),
+        "vtk": vtkVersion.GetVTKVersion(),
         "class": grid.GetClassName(),
         "points": grid.GetNumberOfPoints(),
         "cells": grid.GetNumberOfCells(),
@@ -58,14 +63,14 @@ def read(path):
 
 def read_tree(path):
     """A HyperTreeGrid: sums of its fields over the leaves, which a cursor finds."""
-    reader = vtk.vtkXMLHyperTreeGridReader()
+    reader = vtkXMLHyperTreeGridReader()
     reader.SetFileName(path)
     reader.Update()
     grid = reader.GetOutput()
     data = grid.GetCellData()
     fields = {data.GetArray(i).GetName(): data.GetArray(i) for i in range(data.GetNumberOfArrays())}
     sums = dict.fromkeys(fields, 0.0)
-    cursor = vtk.vtkHyperTreeGridNonOrientedCursor()
+    cursor = vtkHyperTreeGridNonOrientedCursor()
     leaves = 0
 
     def visit():
@@ -86,7 +91,7 @@ def read_tree(path):
     time = grid.GetFieldData().GetArray("TimeValue")
     return {
         "file": path,
-        "vtk": vtk.vtkVersion.GetVTKVersion(),
+        "vtk": vtkVersion.GetVTKVersion(),
         "leaves": leaves,
         "bounds": list(grid.GetBounds()),
         "sums_of_leaves": sums,

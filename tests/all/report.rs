@@ -6,6 +6,7 @@
 use std::path::Path;
 use std::process::Command;
 
+use crate::common::launch::signal;
 use crate::common::program::{RUBBER_BLOCK, agimp, chromium, finished, succeed, told};
 
 /// A plate is pressed into the block of rubber.
@@ -190,8 +191,7 @@ fn a_run_that_is_stopped_has_a_page_that_names_its_checkpoint() {
         assert!(child.try_wait().expect("a child").is_none(), "it runs on");
         std::thread::sleep(std::time::Duration::from_millis(20));
     }
-    let stopped = Command::new("kill").args(["-TERM", &child.id().to_string()]).status();
-    assert!(stopped.expect("kill").success());
+    signal(child.id(), "TERM");
     assert_eq!(child.wait().expect("it ends").code(), Some(3));
     let page = page(here);
     assert!(page.contains("class=\"state ended\"") && page.contains("stopped at"), "its state");

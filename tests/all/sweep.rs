@@ -6,6 +6,8 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 use std::time::{Duration, Instant, SystemTime};
 
+use crate::common::launch::signal;
+
 const JOB: &str = "version = 1\ndimension = 2\ngravity = [0, -9.81]\n[domain]\nsize = [2, 2]\nroot_edge = 1\n\
     [boundaries]\ny_min = { kind = 'sticky' }\nx_min.kind = 'slip'\nx_max.kind = 'slip'\ny_max.kind = 'separating'\n\
     [[materials]]\nname = 'sand'\ndensity = 1600\nmodel = 'mohr_coulomb'\nyoung = 1e6\npoisson = 0.2\nfriction_angle = 30\n\
@@ -48,8 +50,7 @@ fn a_killed_sweep_goes_on_and_does_no_run_twice() {
         assert!(start.elapsed() < Duration::from_secs(300), "no two runs in 300 s");
         std::thread::sleep(Duration::from_millis(20));
     }
-    let group = format!("-{}", first.id());
-    Command::new("kill").args(["-KILL", "--", &group]).status().expect("kill");
+    signal(format!("-{}", first.id()), "KILL");
     first.wait().expect("ended");
     let before = reports(&runs);
     assert!(before.len() < 6, "killed too late");
@@ -184,27 +185,27 @@ fn a_stopped_sweep_stops_its_run_and_the_same_command_continues() {
     let whole = tempfile::tempdir().expect("temporary directory");
     std::fs::write(whole.path().join("column.toml"), long_job(6)).expect("job");
     assert!(sweep(whole.path(), &over).output().expect("starts").status.success());
-    for signal in ["-TERM", "-USR1", "-INT"] {
+    for name in ["TERM", "USR1", "INT"] {
         let directory = tempfile::tempdir().expect("temporary directory");
         std::fs::write(directory.path().join("column.toml"), long_job(6)).expect("job");
         let child = begun(directory.path());
-        Command::new("kill").args([signal, &child.id().to_string()]).status().expect("kill");
+        signal(child.id(), name);
         let output = child.wait_with_output().expect("ended");
-        assert_eq!(output.status.code(), Some(3), "{signal}: {}", words(&output));
-        assert!(words(&output).contains("the same command continues"), "{signal}: {}", words(&output));
+        assert_eq!(output.status.code(), Some(3), "{name}: {}", words(&output));
+        assert!(words(&output).contains("the same command continues"), "{name}: {}", words(&output));
         let run = directory.path().join("out/column.sweep/density=1600");
         let left: Vec<String> = std::fs::read_dir(run)
             .expect("directory")
             .map(|entry| entry.expect("an entry").file_name().to_string_lossy().into_owned())
             .collect();
-        assert!(left.iter().any(|name| name.contains("checkpoint")), "{signal}: {left:?}");
+        assert!(left.iter().any(|name| name.contains("checkpoint")), "{name}: {left:?}");
         assert!(
             !left.iter().any(|name| name.ends_with(".part") || name.ends_with(".lock")),
-            "{signal}: {left:?}"
+            "{name}: {left:?}"
         );
         let output = sweep(directory.path(), &over).output().expect("starts");
-        assert!(output.status.success(), "{signal}: {}", words(&output));
-        assert_eq!(values(directory.path()), values(whole.path()), "{signal}");
+        assert!(output.status.success(), "{name}: {}", words(&output));
+        assert_eq!(values(directory.path()), values(whole.path()), "{name}");
     }
 }
 
@@ -216,7 +217,7 @@ fn a_second_sweep_in_the_directory_is_refused() {
     let first = begun(directory.path());
     let second =
         sweep(directory.path(), &["--over", "materials.sand.density=1600,1700"]).output().expect("starts");
-    Command::new("kill").args(["-TERM", &first.id().to_string()]).status().expect("kill");
+    signal(first.id(), "TERM");
     let first = first.wait_with_output().expect("ended");
     assert_eq!(second.status.code(), Some(2), "{}", words(&second));
     assert!(words(&second).contains("found another sweep that writes here"), "{}", words(&second));

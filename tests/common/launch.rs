@@ -184,8 +184,8 @@ pub(crate) fn is_alive(process: u32) -> bool {
         .is_ok_and(|stat| !stat.rsplit(')').next().unwrap_or_default().trim_start().starts_with('Z'))
 }
 
-/// Sends a signal, given as `kill` names it.
-pub(crate) fn signal(process: u32, name: &str) {
+/// Sends a signal, given as `kill` names it, to a process, or to a group with a minus sign ahead of its number.
+pub(crate) fn signal(process: impl std::fmt::Display, name: &str) {
     // The shell's own `kill`: small systems have no other.
     let status = Command::new("sh").args(["-c", &format!("kill -{name} {process}")]).status();
     assert!(status.expect("sh starts").success(), "no process {process}");
