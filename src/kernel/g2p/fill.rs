@@ -11,7 +11,9 @@
 //! 1. *Void.* A fluid without tension that has widened, J > 1, has no pressure. It may fill the void that the
 //!    grid has around it and no more: `J ← min(J, max(1, 1/φ))`. Neither energy nor momentum changes.
 //! 2. *Shift.* `x ← x - r_α g h² s`, at most `0.05 h` along each axis, as far as compression does not explain
-//!    the excess: `g = (φ J - 1) / (φ - 1)`, between 0 and 1. In water at rest φ J is 1.
+//!    the excess: `g = (φ J - 1) / (φ - 1)`, between 0 and 1. In water at rest φ J is 1. The shift is a
+//!    diffusion, which takes long over many cells: where φ J - 1 is more than its noise δ, α is
+//!    `1 + 5 max(0, 1 - δ / (φ J - 1))` times as much.
 //! 3. *Mean.* `J ← J + r_β (J̄ - J)` with `J̄ = Σ V₀ J / Σ V₀` over the particles of the fluid in the cell,
 //!    as far as J̄ - J exceeds the change over half a cell that weight explains, `J g h / 2c²`. The energy is
 //!    convex in J, so it falls.
@@ -29,6 +31,10 @@ use crate::simd::{LANES, Vector, VectorMask};
 
 /// Rate α of the shift, in speeds of sound over cells.
 const SHIFT: f64 = 0.15;
+/// Times [`SHIFT`] that are added to it where fluid is far too dense.
+const FASTER: f64 = 5.0;
+/// Excess `φ J - 1` that may be noise.
+const NOISE: f64 = 0.01;
 /// Greatest shift of a step along an axis, as a share of a cell.
 const FARTHEST: f64 = 0.05;
 /// Rate β towards the mean of a cell, in speeds of sound over cells.
@@ -141,10 +147,12 @@ impl<V: Vector, const D: usize> Filled<V, D> {
         booked: &mut Booked<D>,
     ) {
         let (zero, one) = (V::splat(0.0), V::splat(1.0));
-        let excess = self.fill - one;
-        let unexplained = ((self.fill.mul_add(self.ratio, -one)) / excess).max(zero).min(one);
-        let unexplained = zero.lt(excess).select(unexplained, one);
-        let factor = share(self.reach, SHIFT) * unexplained * (self.cell * self.cell);
+        let (excess, noise) = (self.fill - one, V::splat(NOISE));
+        let unexplained = self.fill.mul_add(self.ratio, -one);
+        let part = zero.lt(excess).select((unexplained / excess).max(zero).min(one), one);
+        let beyond_noise = (unexplained - noise).max(zero) / unexplained.max(noise);
+        let rate = self.reach * beyond_noise.mul_add(V::splat(FASTER), one);
+        let factor = share(rate, SHIFT) * part * (self.cell * self.cell);
         let farthest = V::splat(FARTHEST * self.cell);
         let mass: V = batch.load(tile, Layout::<D>::MASS);
         for axis in 0..D {
