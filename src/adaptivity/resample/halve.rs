@@ -7,10 +7,10 @@
 //! So an elastic particle whose box has become wider than [`WIDE`] cells along an axis, and is in tension
 //! along it, becomes two, half as wide along this axis alone, and with it all of its material in the
 //! leaf that is at least [`SLACK`] as wide: beside grips, where the stretch changes within a cell, whole ones
-//! among halves tear. Their
-//! centres are where the stretch has carried those of the halves of the undeformed box, at `± V d`: along
-//! the axis itself, material that is stretched on a slant would move across. Its tag says so (see
-//! [`crate::particle::halvings`]). Mass, momentum and angular momentum are kept as [`pair::part`] says.
+//! among halves tear. Their centres are where the stretch has carried those of the halves of the undeformed
+//! box, at `± V d`: along the axis itself, material that is stretched on a slant would move across. Its tag
+//! says so (see [`crate::particle::halvings`]). Mass, momentum and angular momentum are kept as
+//! [`pair::part`] says.
 use std::collections::BTreeMap;
 
 use super::mixture::{Group, mixtures};
@@ -260,10 +260,9 @@ fn narrow_pairs<const D: usize>(chunk: &Chunk<D>, setting: &Setting<D>) -> Vec<(
         let halved = (0..D).filter(|&a| halvings::along(tag, a) > 0);
         let axis = halved.max_by(|&a, &b| share(a).total_cmp(&share(b)))?;
         let (undeformed, most) = (undeformed[0][axis], half[axis].max(other[axis]));
+        let bound = joined(undeformed, setting.cell());
         let of = (material(chunk, members[0] as usize), axis);
-        let is_narrow = most < joined(undeformed, setting.cell())
-            && (most < SLACK * joined(undeformed, setting.cell())
-                || !wide.has_narrower(of, 2.0 * undeformed));
+        let is_narrow = most < bound && (most < SLACK * bound || !wide.has_narrower(of, 2.0 * undeformed));
         let group = Group { rejoined: Some(axis), ..Group::new(members.to_vec(), parent, true) };
         is_narrow.then_some((Tag::unpack(tag).level, group))
     });

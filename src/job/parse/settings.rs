@@ -4,6 +4,7 @@
 //! Places in it are mapped back to the file that the user has written.
 use super::error::{Fault, QUOTED, names as listed};
 use super::source::Path;
+use super::syntax::unquoted;
 use crate::text::excerpt;
 use std::ffi::OsStr;
 use std::ops::Range;
@@ -102,16 +103,8 @@ impl Settings {
 
 /// At the first `=` that is not quoted.
 fn split(text: &str) -> Option<(&str, &str)> {
-    let mut quote = None;
-    for (at, c) in text.char_indices() {
-        match (quote, c) {
-            (None, '=') => return Some((&text[..at], &text[at + 1..])),
-            (None, '"' | '\'') => quote = Some(c),
-            (Some(open), c) if c == open => quote = None,
-            _ => {}
-        }
-    }
-    None
+    let at = unquoted(text, '=')?;
+    Some((&text[..at], &text[at + 1..]))
 }
 
 /// A value of TOML, or a text without quotes.

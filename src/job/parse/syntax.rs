@@ -3,6 +3,7 @@
 //! The parser names the rule that a text breaks ("invalid mantissa"), not what a person has to change. Here
 //! the line on which it stopped is looked at once more for what people write by habit: `.5`, `1/3`,
 //! `1000 kg`, `True`, a word without quotes, `key: value`.
+use super::unclosed::is_key;
 use std::ops::Range;
 
 /// Longest line that is looked at, bytes; people do not write longer ones.
@@ -12,43 +13,41 @@ const LONGEST: usize = 200;
 pub(super) fn explain(text: &str, error: usize) -> Option<(Range<usize>, String)> {
     let start = text.get(..error)?.rfind('\n').map_or(0, |newline| newline + 1);
     let end = text[error..].find('\n').map_or(text.len(), |newline| error + newline);
-    let line = without_comment(&text[start..end]);
+    let line = &text[start..end];
+    let line = &line[..unquoted(line, '#').unwrap_or(line.len())];
     let at = (error - start).min(line.len());
     if line.len() > LONGEST {
         return None;
     }
     let equals = line.find('=').filter(|equals| *equals < at);
     let from = equals.map_or(0, |equals| equals + 1);
-    let (shown, words) = match equals {
-        Some(_) if !line[from..].trim_start().starts_with(['[', '{']) => {
-            (line[from..].trim(), of_value(line[from..].trim(), &line[..from]))
-        }
-        // An element of a list or a table, or of a list that began on a line before.
-        _ => {
-            let element = element(line, at);
-            match of_number(element).or_else(|| equals.and_then(|_| of_word(element))) {
-                Some(words) => (element, Some(words)),
-                None if equals.is_none() => (line.trim(), of_key(line.trim())),
-                None => (element, None),
-            }
-        }
+    // The element is one of a list or a table, or of a list that began on a line before.
+    let (value, element) = (line[from..].trim(), element(line, at));
+    let (shown, words) = if equals.is_some() && !value.starts_with(['[', '{']) {
+        (value, of_value(value, &line[..from]))
+    } else if let Some(words) = of_number(element) {
+        (element, Some(words))
+    } else if equals.is_some() {
+        (element, of_word(element))
+    } else {
+        (line.trim(), of_key(line.trim()))
     };
     let offset = if shown.is_empty() { at } else { shown.as_ptr() as usize - line.as_ptr() as usize };
     words.map(|words| (start + offset..start + offset + shown.len(), words))
 }
 
-/// A line up to its comment.
-fn without_comment(line: &str) -> &str {
+/// Where a sign stands first that is not quoted.
+pub(super) fn unquoted(text: &str, sign: char) -> Option<usize> {
     let mut quote = None;
-    for (at, sign) in line.char_indices() {
-        match (sign, quote) {
-            ('#', None) => return &line[..at],
-            ('"' | '\'', None) => quote = Some(sign),
-            _ if quote == Some(sign) => quote = None,
+    for (at, c) in text.char_indices() {
+        match (quote, c) {
+            (None, c) if c == sign => return Some(at),
+            (None, '"' | '\'') => quote = Some(c),
+            (Some(open), c) if c == open => quote = None,
             _ => {}
         }
     }
-    line
+    None
 }
 
 /// The element of a list or table of one line in which a byte lies.
@@ -149,10 +148,6 @@ fn of_word(value: &str) -> Option<String> {
 
 /// Words for a line in which a key has no value.
 fn of_key(line: &str) -> Option<String> {
-    let is_key = |word: &str| {
-        let is_bare = |c: char| c.is_ascii_alphanumeric() || "_-.".contains(c);
-        word.starts_with(|c: char| c.is_ascii_alphabetic()) && word.chars().all(is_bare)
-    };
     let (key, value) = line.split_once('=').unwrap_or((line, ""));
     if !value.is_empty() {
         let words: Vec<&str> = key.split_whitespace().collect();

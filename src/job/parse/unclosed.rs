@@ -147,7 +147,7 @@ fn inside(text: &str, open: char, close: char) -> Option<&str> {
 }
 
 /// Whether a word is a key without quotes, perhaps of several parts.
-fn is_key(word: &str) -> bool {
+pub(super) fn is_key(word: &str) -> bool {
     let is_bare = |c: char| c.is_ascii_alphanumeric() || "_-.".contains(c);
     word.starts_with(|c: char| c.is_ascii_alphabetic() || c == '_') && word.chars().all(is_bare)
 }
