@@ -94,3 +94,10 @@ impl Default for Quantity {
         Self::Constant(0.0)
     }
 }
+
+/// Processor time of this thread (s), to which other programs on the machine do not add.
+#[cfg(test)]
+fn thread_seconds() -> f64 {
+    let time = rustix::time::clock_gettime(rustix::time::ClockId::ThreadCPUTime);
+    time.tv_sec as f64 + 1e-9 * time.tv_nsec as f64
+}

@@ -5,8 +5,8 @@
 //! `# expect: LINE:COLUMN | part of the message | …` for bad ones, `# expect: part of the output | …`
 //! for good ones.
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
 
+use crate::common::program::agimp;
 use crate::common::three_at_a_time;
 
 fn jobs(kind: &str) -> Vec<(PathBuf, String)> {
@@ -28,10 +28,6 @@ fn expectations(text: &str) -> Vec<Vec<&str>> {
         .collect();
     assert!(!expected.is_empty(), "a job without expectation:\n{text}");
     expected
-}
-
-fn agimp(directory: &Path, arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_agimp")).args(arguments).current_dir(directory).output().unwrap()
 }
 
 /// The commands that read a job.

@@ -1,21 +1,13 @@
 //! Warnings of `agimp check` and `agimp run`, and their refusals where the machine is too small.
 use std::path::Path;
-use std::process::{Command, Output};
+use std::process::Output;
 use std::time::Instant;
 
+use crate::common::program::{agimp, confined};
 use crate::common::three_at_a_time;
 
-fn agimp(directory: &Path, arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_agimp")).args(arguments).current_dir(directory).output().unwrap()
-}
-
-/// The program with at most so many kB of addresses.
-fn confined(directory: &Path, kilobytes: u64, arguments: &[&str]) -> Output {
-    let script = format!("ulimit -v {kilobytes}; exec \"$0\" \"$@\"");
-    let mut command = Command::new("bash");
-    command.args(["-c", &script, env!("CARGO_BIN_EXE_agimp")]).args(arguments).current_dir(directory);
-    command.output().unwrap()
-}
+/// Most seconds of processor time of what is answered at once. Three in a release build.
+const AT_ONCE: u32 = 60;
 
 fn words(output: &Output) -> String {
     String::from_utf8_lossy(&output.stderr).into_owned()
@@ -315,8 +307,7 @@ fn jobs_beyond_the_memory_of_the_machine_are_refused_at_once() {
         "[tree]\nregions = [{ level = 12, shape = { kind = \"box\", min = [0, 0], max = [4, 1] } }]\n[time]";
     for (name, tree, limit) in [("region", region, 8_000_000), ("criteria", criteria, 900_000)] {
         std::fs::write(here.join("job.toml"), changed(&[("[time]", tree)])).unwrap();
-        let start = Instant::now();
-        let run = confined(here, limit, &["run", "job.toml", "--quiet"]);
+        let run = confined(here, AT_ONCE, Some(limit), &["run", "job.toml", "--quiet"]);
         let message = words(&run);
         assert_eq!(run.status.code(), Some(2), "{name}: {message}");
         assert!(
@@ -324,9 +315,7 @@ fn jobs_beyond_the_memory_of_the_machine_are_refused_at_once() {
             "{name}: {message}"
         );
         assert!(!here.join("out").exists(), "{name}");
-        // Three seconds on an idle machine.
-        assert!(start.elapsed().as_secs() < 120, "{name}: {:?}", start.elapsed());
-        let check = confined(here, limit, &["check", "job.toml"]);
+        let check = confined(here, AT_ONCE, Some(limit), &["check", "job.toml"]);
         let message = words(&check);
         assert_eq!(check.status.code(), Some(0), "{name}: {message}");
         assert!(message.contains("agimp: warning: tree: the job takes about "), "{name}: {message}");
@@ -339,7 +328,7 @@ fn memory_that_is_not_there_ends_the_program_with_a_message() {
     let directory = tempfile::tempdir().unwrap();
     let model = "model = \"hencky\", young = 1e6, poisson = 0.3";
     let arguments = ["material", "--model", model, "--test", "oedometer", "--rows", "1000000"];
-    let output = confined(directory.path(), 200_000, &arguments);
+    let output = confined(directory.path(), AT_ONCE, Some(200_000), &arguments);
     assert_eq!(output.status.code(), Some(1), "{:?} {}", output.status, words(&output));
     assert!(words(&output).starts_with("agimp: no memory left: found no room for "), "{}", words(&output));
 }
@@ -353,14 +342,18 @@ fn the_wall_time_of_a_job_is_measured() {
         [("velocity = [0.1, 0]", "velocity = [1e-3, 0]"), ("velocity = [0, -0.02]", "velocity = [0, -1e-4]")];
     let job = changed(&[slow[0], slow[1], ("end = 2", "end = 3")]);
     std::fs::write(here.join("job.toml"), job).unwrap();
-    let out = String::from_utf8(agimp(here, &["check", "job.toml"]).stdout).unwrap();
-    let line = out.lines().find(|line| line.starts_with("wall time")).unwrap();
-    assert!(line.contains("of this machine by a few steps"), "{line}");
-    let told: f64 = line.split_whitespace().filter_map(|word| word.parse().ok()).next().unwrap();
-    let start = Instant::now();
-    let run = agimp(here, &["run", "job.toml", "--quiet"]);
-    assert_eq!(run.status.code(), Some(0), "{}", words(&run));
-    let taken = start.elapsed().as_secs_f64();
-    // Within a factor of two on an idle machine; others may be busy with one of both.
-    assert!(told < 5.0 * taken && taken < 5.0 * told, "{told} s told, {taken} s taken");
+    let told_and_taken = || {
+        let out = String::from_utf8(agimp(here, &["check", "job.toml"]).stdout).unwrap();
+        let line = out.lines().find(|line| line.starts_with("wall time")).unwrap();
+        assert!(line.contains("of this machine by a few steps"), "{line}");
+        let told: f64 = line.split_whitespace().filter_map(|word| word.parse().ok()).next().unwrap();
+        let start = Instant::now();
+        let run = agimp(here, &["run", "job.toml", "--quiet", "--overwrite"]);
+        assert_eq!(run.status.code(), Some(0), "{}", words(&run));
+        (told, start.elapsed().as_secs_f64())
+    };
+    // Within a factor of two on an idle machine; others may be busy with one of both, but not thrice.
+    let pairs: Vec<(f64, f64)> = (0..3).map(|_| told_and_taken()).collect();
+    let is_near = |&(told, taken): &(f64, f64)| told < 5.0 * taken && taken < 5.0 * told;
+    assert!(pairs.iter().any(is_near), "told and taken, s: {pairs:?}");
 }

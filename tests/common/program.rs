@@ -39,6 +39,16 @@ pub(crate) fn agimp(directory: &Path, arguments: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_agimp")).args(arguments).current_dir(directory).output().expect("starts")
 }
 
+/// The same within this many seconds of processor time, which what else runs on the machine does not
+/// lengthen; it is killed if it takes more. At most so many kB of addresses, if any.
+pub(crate) fn confined(directory: &Path, seconds: u32, kilobytes: Option<u64>, arguments: &[&str]) -> Output {
+    let memory = kilobytes.map_or_else(String::new, |most| format!("ulimit -v {most}; "));
+    let script = format!("ulimit -t {seconds}; {memory}exec \"$0\" \"$@\"");
+    let mut command = Command::new("bash");
+    command.args(["-c", &script, env!("CARGO_BIN_EXE_agimp")]).args(arguments).current_dir(directory);
+    command.output().expect("bash starts")
+}
+
 /// All that a program has said.
 pub(crate) fn told(output: &Output) -> String {
     [&output.stdout, &output.stderr].map(|bytes| String::from_utf8_lossy(bytes).into_owned()).concat()

@@ -1,13 +1,9 @@
 //! Ranks that were started differently, or that see different texts of the job, do not run different jobs.
 use std::path::{Path, PathBuf};
 use std::process::Command;
-use std::time::Duration;
 
 use crate::common::in_turn;
 use crate::common::launch::{Outcome, Running, by_rank, job, mpirun, run, succeed, text};
-
-/// A run that waits for ever would take longer.
-const SOON: Duration = Duration::from_secs(60);
 
 /// Changes of the small collapse that rank 1 alone sees.
 const CHANGES: [(&str, &str); 7] = [
@@ -56,14 +52,14 @@ fn all_ranks_run_the_job_of_rank_0() {
         let home = tempfile::tempdir().expect("temporary directory");
         jobs(home.path(), change);
         let mut command = each_in_its_folder(home.path(), "run collapse_2d.toml --threads 1 --quiet");
-        let output = Running::start(&mut command).finish_within(SOON);
+        let output = Running::start(&mut command).finish_soon();
         assert_eq!(output.status.code(), Some(0), "{change:?}: {}", text(&output));
         Outcome::read(home.path(), "collapse_2d").assert_same(&expected, &format!("{change:?} on rank 1"));
     }
     let home = tempfile::tempdir().expect("temporary directory");
     jobs(home.path(), CHANGES[5]);
     let output = Running::start(&mut each_in_its_folder(home.path(), "check collapse_2d.toml"));
-    let output = output.finish_within(SOON);
+    let output = output.finish_soon();
     assert_eq!(output.status.code(), Some(0), "{}", text(&output));
     assert_eq!(text(&output).matches("5 x 2 root octants").count(), 1, "{}", text(&output));
 }
@@ -87,7 +83,7 @@ fn ranks_need_the_same_command() {
     let started = |words: &[&str]| format!("exec {agimp} {}", words.join(" "));
     for (first, second) in cases {
         let mut command = by_rank(home.path(), [&started(&first), &started(&second)]);
-        let output = Running::start(&mut command).finish_within(SOON);
+        let output = Running::start(&mut command).finish_soon();
         let shown = text(&output);
         assert_eq!(output.status.code(), Some(2), "{shown}");
         let expected = format!(

@@ -1,7 +1,6 @@
 //! Runs that share a directory: no two at once, and no results destroyed that nobody has given up.
 use std::path::{Path, PathBuf};
 use std::process::Command;
-use std::time::Duration;
 
 use crate::common::in_turn;
 use crate::common::launch::{
@@ -9,13 +8,11 @@ use crate::common::launch::{
 };
 
 const NAME: &str = "collapse_2d";
-/// A refused run has ended by then, on a busy machine.
-const SOON: Duration = Duration::from_secs(60);
 
 /// Starts a run that must be refused with exit code 2 and one message with these words, and change nothing.
 fn refused(directory: &Path, ranks: usize, job: &Path, arguments: &[&str], words: &[&str]) {
     let before = contents(&directory.join("out").join(NAME));
-    let output = Running::start(&mut run(directory, ranks, 1, job, arguments)).finish_within(SOON);
+    let output = Running::start(&mut run(directory, ranks, 1, job, arguments)).finish_soon();
     let shown = text(&output);
     assert_eq!(output.status.code(), Some(2), "{shown}");
     assert_eq!(reasons(&shown).len() + shown.matches("error:").count(), 1, "one message: {shown}");
@@ -48,7 +45,7 @@ fn one_run_at_a_time() {
     signal(running.launcher(), "STOP");
     let holder = format!("process {} on host ", running.launcher());
     for arguments in [&["--overwrite"][..], &["--restart", "latest"], &[]] {
-        let output = Running::start(&mut run(directory, 2, 1, &job, arguments)).finish_within(SOON);
+        let output = Running::start(&mut run(directory, 2, 1, &job, arguments)).finish_soon();
         let shown = text(&output);
         assert_eq!(output.status.code(), Some(2), "{shown}");
         assert_eq!(shown.matches("agimp:").count(), 1, "one message: {shown}");
@@ -163,7 +160,7 @@ fn a_host_without_the_directory_is_named() {
         }
         let start = if restart { format!("{start} --restart latest") } else { start.clone() };
         let mut command = by_rank(home.path(), [&start, &elsewhere(&start)]);
-        let output = Running::start(&mut command).finish_within(SOON);
+        let output = Running::start(&mut command).finish_soon();
         let shown = text(&output);
         assert_eq!(output.status.code(), Some(2), "{shown}");
         let words = "out/collapse_2d: host elsewhere does not see this directory as rank 0 does";

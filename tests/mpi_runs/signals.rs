@@ -10,10 +10,9 @@ use crate::common::launch::{Running, agimp, job, run, signal, succeed, text};
 use crate::common::mpirun::{environment, is_mpich};
 
 const NAME: &str = "collapse_2d";
-const SOON: Duration = Duration::from_secs(60);
 
 fn stops_with_a_checkpoint(running: Running, directory: &Path, what: &str) {
-    let output = running.finish_within(SOON);
+    let output = running.finish_soon();
     let shown = text(&output);
     assert_eq!(output.status.code(), Some(3), "{what}: {shown}");
     let words = "agimp: stopped on request; continue with --restart ";
@@ -84,9 +83,12 @@ fn a_signal_while_the_first_tree_is_refined_is_heard() {
                 [time]\nend = 1e-6\n[output]\npicture = false\n";
     std::fs::write(&path, job).expect("job");
     let running = Running::start(&mut run(home.path(), 2, 1, &path, &["--quiet"]));
-    std::thread::sleep(Duration::from_secs(2));
+    // Until then there is nobody whom `mpirun` could hand it to.
+    while running.ranks().len() < 2 || !running.ranks().iter().all(|&rank| catches(rank, 10)) {
+        std::thread::sleep(Duration::from_millis(5));
+    }
     signal(running.launcher(), "USR1");
-    let output = running.finish_within(SOON);
+    let output = running.finish_soon();
     let shown = text(&output);
     assert!(matches!(output.status.code(), Some(0 | 3)), "{shown}");
     let is_early = shown.contains("stopped on request before the first step, and nothing is written");
@@ -143,7 +145,7 @@ fn names_that_are_not_utf_8() {
     let named = |bytes: &[u8]| home.path().join(std::ffi::OsStr::from_bytes(bytes));
     let bad = named(b"caf\xe9.toml");
     std::fs::copy(job("few_leaves"), &bad).expect("copied");
-    let output = Running::start(&mut run(home.path(), 2, 1, &bad, &[])).finish_within(SOON);
+    let output = Running::start(&mut run(home.path(), 2, 1, &bad, &[])).finish_soon();
     let shown = text(&output);
     assert_eq!(output.status.code(), Some(2), "{shown}");
     assert_eq!(shown.matches("found a file name that is not UTF-8").count(), 1, "{shown}");
