@@ -15,11 +15,13 @@
 //!
 //! | file | what it holds |
 //! |---|---|
-//! | this | the sweep over the particles of a bin, and their advance |
+//! | this | the sweeps over the particles of a bin |
+//! | `advance` | their new velocity, place, strain and stress |
 //! | `gathered` | the sums over nodes |
 //! | [`fill`] | remedies that keep fluids in their volume |
 //! | `steep` | a bound on rates of elastic particles that are alone |
 //! | [`leavers`], [`rates`], [`booked`] | particles that leave; rates of deformation; sums for the history |
+pub use self::advance::Advance;
 use self::booked::Booked;
 use self::fill::Filling;
 pub use self::gathered::{FILL_MORE, Fields, Gathered, Moments};
@@ -29,12 +31,11 @@ use self::rates::Rates;
 use super::batch::{Batch, Batches, Tile};
 use super::domain::AtWall;
 use super::weights::{NodeWeights, Weights};
-use super::{Coordinates, Frame, Row, Scheme, Select, SubBox, Transfer, domain, symmetric_index};
-use crate::material::eigen::determinant;
-use crate::material::{self, Shock, State, Step};
+use super::{Coordinates, Frame, Row, Scheme, Select, SubBox, domain};
 use crate::particle::chunk::{Chunk, Layout, Place};
-use crate::simd::{Kernel, LANES, Lanes, Vector, VectorMask, widest};
+use crate::simd::{Kernel, LANES, Lanes, Vector, widest};
 
+mod advance;
 pub mod booked;
 pub mod fill;
 mod gathered;
@@ -264,212 +265,4 @@ pub fn look<const D: usize>(
 
 fn largest<V: Vector>(lanes: V) -> f64 {
     lanes.to_array().into_iter().fold(0.0, f64::max)
-}
-
-/// Input of the advance of particles, beside the gathered values.
-#[derive(Clone, Copy)]
-pub struct Advance<'a> {
-    /// Properties of the run, the same for all particles.
-    pub scheme: &'a Scheme<'a>,
-    /// Length of the step, s.
-    pub dt: f64,
-    /// The least edge of the cells that their boxes overlap, m.
-    pub cell: f64,
-    /// As [`Gather::dilation`].
-    pub dilation: &'a [f64],
-    /// As [`Gather::filling`].
-    pub filling: Option<&'a Filling<'a>>,
-}
-
-impl Advance<'_> {
-    /// New state of a batch; returns wave speed plus particle speed.
-    #[inline(always)]
-    fn batch<V: Vector, const D: usize>(
-        &self,
-        tile: &mut [[f64; LANES]],
-        tags: &[u64],
-        batch: &Batch,
-        position: &[V; D],
-        sums: &Sums<D>,
-        wall: Option<AtWall<V, D>>,
-        (leavers, booked): (&mut Leavers<D>, &mut Booked<D>),
-    ) -> V {
-        let &Self { scheme, dt, cell, dilation, filling } = self;
-        let zero = V::splat(0.0);
-        let step = V::splat(dt);
-        let velocity = V::columns(&sums.velocity);
-        let mut square = zero;
-        let mut gradient = [[zero; D]; D];
-        for k in 0..D {
-            let column = V::columns(&sums.gradient[k]);
-            for i in 0..D {
-                gradient[i][k] = column[i];
-            }
-        }
-        let increment =
-            if scheme.transfer.has_increments() { V::columns(&sums.increment) } else { [zero; 4] };
-        let mut moved = *position;
-        let is_ring = scheme.coordinates == Coordinates::Axisymmetric;
-        let plain = if is_ring { V::columns(&sums.plain) } else { velocity };
-        for i in 0..D {
-            moved[i] = plain[i].mul_add(step, position[i]);
-            let new = match scheme.transfer {
-                Transfer::Apic | Transfer::Tpic => velocity[i],
-                Transfer::Flip { blend } => {
-                    let flip = batch.load::<V>(tile, Layout::<D>::VELOCITY + i) + increment[i];
-                    (flip - velocity[i]).mul_add(V::splat(blend), velocity[i])
-                }
-                Transfer::Xpic { .. } => increment[i],
-            };
-            batch.store(tile, Layout::<D>::VELOCITY + i, new);
-            square = new.mul_add(new, square);
-        }
-        // Jobs with one material need not read tags.
-        let index = if scheme.materials.len() == 1 { [0; LANES] } else { batch.materials(tags) };
-        let mut elastic = [zero; 6];
-        for c in 0..Layout::<D>::SYMMETRIC {
-            elastic[c] = batch.load(tile, Layout::<D>::LEFT_CAUCHY_GREEN + c);
-        }
-        let filled = match filling {
-            Some(filling) => filling.of_batch::<V, D>(batch, index, sums, &elastic, cell),
-            None => None,
-        };
-        if let Some(filled) = &filled {
-            filled.shift(batch, tile, &mut moved, wall.map(|wall| wall.extent), booked);
-        }
-        for i in 0..D {
-            batch.store(tile, Layout::<D>::POSITION + i, moved[i]);
-        }
-        leavers.look(batch, &moved);
-        let kept = match (scheme.transfer, wall) {
-            (Transfer::Apic, Some(wall)) => wall.kept_affine_velocity(&moved),
-            _ => None,
-        };
-        let flows = || domain::plastic_lanes(|| index, scheme);
-        let mut added = if dilation.is_empty() { zero } else { batch.values(dilation) };
-        let mut hoop = if is_ring { plain[2] } else { zero };
-        let mut affine_kept = None;
-        if !scheme.is_all_plastic {
-            affine_kept = steep::Rate { gradient: &gradient, added, hoop }.kept(step, flows);
-        }
-        if let Some(kept) = affine_kept {
-            gradient = gradient.map(|row| row.map(|rate| rate * kept));
-            (added, hoop) = (added * kept, hoop * kept);
-        }
-        for k in 0..D {
-            let mut affine = V::columns(&sums.affine[k]);
-            if let Some(kept) = affine_kept {
-                affine = affine.map(|affine| affine * kept);
-            }
-            for i in 0..D {
-                let value = match (scheme.transfer, kept) {
-                    (Transfer::Apic, Some(kept)) => affine[i] * kept[k],
-                    (Transfer::Apic, None) => affine[i],
-                    _ => gradient[i][k],
-                };
-                batch.store(tile, Layout::<D>::AFFINE + D * i + k, value);
-            }
-        }
-        let plastic = flows() != 0;
-        if !dilation.is_empty() {
-            (0..D).for_each(|i| gradient[i][i] += added);
-        }
-        let mut trial = strained(&elastic, &gradient, step);
-        if is_ring {
-            hoop += added;
-            let stretch = hoop.mul_add(step, V::splat(1.0));
-            trial[2] = stretch * stretch * elastic[2];
-        }
-        if let Some(filled) = &filled {
-            filled.settle(&mut trial);
-        }
-        let mut state = State::new([Lanes::splat(0.0); 6]);
-        for c in 0..6 {
-            trial[c].store(state.elastic[c].as_array_mut());
-        }
-        if plastic {
-            for h in 0..material::HISTORIES {
-                if h < scheme.histories {
-                    let history: V = batch.load(tile, Layout::<D>::HISTORY + h);
-                    history.store(state.history[h].as_array_mut());
-                }
-            }
-        }
-        let size = if scheme.softens { scheme.sizes(tags, batch) } else { [0.0; LANES] };
-        let shock = scheme.viscosity.map(|viscosity| {
-            let plane = (1..D).fold(gradient[0][0], |sum, i| sum + gradient[i][i]);
-            Shock { viscosity, rate: (plane + hoop).to_array() }
-        });
-        let update = Step { dt, plane: D == 2, cell, size, shock };
-        match scheme.materials {
-            [only] => only.update(&mut state, &update),
-            several => material::update(several, &index, &mut state, &update),
-        }
-        let result = |lanes: &Lanes| V::load(lanes.as_array());
-        // The sum is not finite if any of them is not.
-        let mut sum = zero;
-        for c in 0..Layout::<D>::SYMMETRIC {
-            elastic[c] = result(&state.elastic[c]);
-            batch.store(tile, Layout::<D>::LEFT_CAUCHY_GREEN + c, elastic[c]);
-            let stress = result(&state.stress[c]);
-            batch.store(tile, Layout::<D>::STRESS + c, stress);
-            sum += stress;
-        }
-        let ratio = determinant(&elastic);
-        if plastic {
-            for h in 0..material::HISTORIES {
-                if h < scheme.histories {
-                    let history = result(&state.history[h]);
-                    batch.store(tile, Layout::<D>::HISTORY + h, history);
-                    sum += history;
-                }
-            }
-        }
-        if scheme.viscosity.is_some() {
-            let width = batch.load::<V>(tile, Layout::<D>::HALF) * 2.0;
-            let volume = (1..D).fold(width, |volume, _| volume * width);
-            for (sum, work) in booked.shocks.iter_mut().zip(&state.shock) {
-                booked::add(sum, batch.of_members(result(work) * volume));
-            }
-        }
-        if plastic {
-            let work = batch.load::<V>(tile, Layout::<D>::WORK) + result(&state.work);
-            batch.store(tile, Layout::<D>::WORK, work);
-            sum += work;
-        }
-        let speed = result(&state.wave_speed) + square.sqrt();
-        let most = V::splat(f64::MAX);
-        let is_sound = zero.lt(ratio) & ratio.le(most) & sum.abs().le(most) & speed.le(most);
-        batch.of_members(is_sound.select(speed, V::splat(f64::INFINITY)))
-    }
-}
-
-/// `(1 + Δt ∇v) b (1 + Δt ∇v)ᵀ`; in plane strain zz stays.
-#[inline(always)]
-fn strained<V: Vector, const D: usize>(b: &[V; 6], gradient: &[[V; D]; D], step: V) -> [V; 6] {
-    let mut a = *gradient;
-    for i in 0..D {
-        for k in 0..D {
-            let unit = V::splat(if i == k { 1.0 } else { 0.0 });
-            a[i][k] = gradient[i][k].mul_add(step, unit);
-        }
-    }
-    let mut out = *b;
-    for i in 0..D {
-        let mut ab = [V::splat(0.0); D];
-        for j in 0..D {
-            ab[j] = a[i][0] * b[symmetric_index::<D>(0, j)];
-            for k in 1..D {
-                ab[j] = a[i][k].mul_add(b[symmetric_index::<D>(k, j)], ab[j]);
-            }
-        }
-        for j in i..D {
-            let mut sum = ab[0] * a[j][0];
-            for k in 1..D {
-                sum = ab[k].mul_add(a[j][k], sum);
-            }
-            out[symmetric_index::<D>(i, j)] = sum;
-        }
-    }
-    out
 }

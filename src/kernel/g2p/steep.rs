@@ -12,20 +12,20 @@ use crate::simd::{Vector, VectorMask};
 const MOST: f64 = 0.5;
 
 /// Rates of a batch, 1/s.
-pub(super) struct Rate<'a, V, const D: usize> {
+pub(super) struct Rate<V, const D: usize> {
     /// Velocity gradient.
-    pub gradient: &'a [[V; D]; D],
+    pub gradient: [[V; D]; D],
     /// Rate that its diagonal gets for the strain beside its own.
     pub added: V,
     /// Rate along the hoop; 0 but in axisymmetry.
     pub hoop: V,
 }
 
-impl<V: Vector, const D: usize> Rate<'_, V, D> {
-    /// The share of the rates that remains in a step of so many seconds; none if all do. `flows` has a bit
-    /// for each lane whose material flows, and keeps all.
+impl<V: Vector, const D: usize> Rate<V, D> {
+    /// Cuts rates that are too steep for a step of so many seconds. Returns the share that remains; none if
+    /// all does. `flows` has a bit for each lane whose material flows, and keeps all.
     #[inline(always)]
-    pub(super) fn kept(&self, step: V, flows: impl Fn() -> u32) -> Option<V> {
+    pub(super) fn limit(&mut self, step: V, flows: impl Fn() -> u32) -> Option<V> {
         let mut greatest = (self.hoop + self.added).abs();
         for (i, row) in self.gradient.iter().enumerate() {
             for (k, &rate) in row.iter().enumerate() {
@@ -38,7 +38,25 @@ impl<V: Vector, const D: usize> Rate<'_, V, D> {
             return None;
         }
         let kept = (V::splat(MOST) / greatest).min(V::splat(1.0));
-        Some(V::Mask::from_bits(flows()).select(V::splat(1.0), kept))
+        let kept = V::Mask::from_bits(flows()).select(V::splat(1.0), kept);
+        self.gradient = self.gradient.map(|row| row.map(|rate| rate * kept));
+        (self.added, self.hoop) = (self.added * kept, self.hoop * kept);
+        Some(kept)
+    }
+
+    /// The rates of the strain: with what is added to them.
+    #[inline(always)]
+    pub(super) fn add(&mut self, is_ring: bool) {
+        (0..D).for_each(|i| self.gradient[i][i] += self.added);
+        if is_ring {
+            self.hoop += self.added;
+        }
+    }
+
+    /// Rate of the volume.
+    #[inline(always)]
+    pub(super) fn trace(&self) -> V {
+        (1..D).fold(self.gradient[0][0], |sum, i| sum + self.gradient[i][i]) + self.hoop
     }
 }
 
@@ -50,8 +68,8 @@ mod tests {
     /// Share that remains of rates in a step of 1e-3 s, by lane, with a bit for each lane that flows.
     fn kept(gradient: [[f64; 2]; 2], [added, hoop]: [f64; 2], flows: u32) -> Option<[f64; LANES]> {
         let gradient = gradient.map(|row| row.map(Lanes::splat));
-        let rate = Rate { gradient: &gradient, added: Lanes::splat(added), hoop: Lanes::splat(hoop) };
-        rate.kept(Lanes::splat(1e-3), || flows).map(Lanes::to_array)
+        let mut rate = Rate { gradient, added: Lanes::splat(added), hoop: Lanes::splat(hoop) };
+        rate.limit(Lanes::splat(1e-3), || flows).map(Lanes::to_array)
     }
 
     /// No component moves more than half a unit in a step, the sum with what the strain gets included.
