@@ -107,11 +107,14 @@ fn split(text: &str) -> Option<(&str, &str)> {
     Some((&text[..at], &text[at + 1..]))
 }
 
-/// A value of TOML, or a text without quotes.
+/// A value of TOML, a number as `.5` or `5.`, or a text without quotes.
 fn read(text: &str) -> Option<Value> {
     if let Ok(mut value) = text.parse::<Value>() {
         value.decor_mut().clear();
         return Some(value);
+    }
+    if let (true, Ok(number)) = (text.contains('.'), text.parse::<f64>()) {
+        return Some(number.into());
     }
     let is_plain = |c: char| c.is_alphanumeric() || "_-+./ ".contains(c);
     (!text.is_empty() && text.chars().all(is_plain)).then(|| text.into())
@@ -334,6 +337,8 @@ density = 1000
             ("gravity.1=-1.6", "-9.81] # down", "-1.6] # down"),
             ("time.end=2", "end = 1.0", "end = 2"),
             ("time.cfl=0.5", "{ end = 1.0 }", "{ end = 1.0 , cfl = 0.5 }"),
+            ("time.cfl=.5", "{ end = 1.0 }", "{ end = 1.0 , cfl = 0.5 }"),
+            ("gravity.1=-9.", "-9.81] # down", "-9.0] # down"),
             ("materials.sand.density=1500", "1600", "1500"),
             ("materials[0].density=1500", "1600", "1500"),
             // A name comes before a number.
@@ -345,12 +350,13 @@ density = 1000
             let same = |text: &str| text.replace(' ', "");
             assert_eq!(same(&text), same(&JOB.replace(from, to)), "{setting}");
         }
-        let text = edited(&["output.every=0.1", "output.directory=a/b", "domain.root_edge=1"])
+        let text = edited(&["output.every=0.1", "output.directory=a/b", "title=1.5.2", "domain.root_edge=1"])
             .expect("applied")
             .text;
         let value: toml::Table = text.parse().expect("TOML");
         assert_eq!(value["output"]["every"].as_float(), Some(0.1));
         assert_eq!(value["output"]["directory"].as_str(), Some("a/b"));
+        assert_eq!(value["title"].as_str(), Some("1.5.2"));
         assert_eq!(value["domain"]["root_edge"].as_integer(), Some(1));
     }
 
