@@ -179,6 +179,42 @@ fn water_at_rest_fills_its_volume_in_space() {
 
 /// Two fluids of unlike density share nodes beside level jumps that follow their surface, between a wall that
 /// stands and one that moves: the same bits on any ranks, and across a restart.
+/// A plate of elastic material, held at both ends, bears a quarter of a metre of water. It bends as far as the beam of
+/// Timoshenko of the same thickness does, also where that is no whole number of boxes.
+#[test]
+fn plates_under_water_bend_by_their_thickness() {
+    let (young, poisson, density, low) = (2e7, 0.3, 2700.0, 0.25);
+    for cells in [3.8, 4.2] {
+        let (thick, depth): (f64, f64) = (cells / 32.0, 0.25);
+        let (top, level) = (low + thick, low + thick + depth);
+        let job = format!(
+            "version = 1\ndimension = 2\ngravity = [0, -9.81]\n[domain]\nsize = [1, 0.75]\nroot_edge = 0.125\n\
+             [boundaries]\nx_min.kind = 'sticky'\nx_max.kind = 'sticky'\ny_min.kind = 'slip'\ny_max.kind = 'slip'\n\
+             [[materials]]\nname = 'rubber'\ndensity = {density}\nmodel = 'neo_hookean'\nyoung = {young}\npoisson = {poisson}\n\
+             [[materials]]\nname = 'water'\ndensity = 1000\nmodel = 'fluid'\nbulk_modulus = 1e6\n\
+             [[bodies]]\nname = 'plate'\nmaterial = 'rubber'\nshape = {{ kind = 'box', min = [0, {low}], max = [1, {top}] }}\n\
+             [[bodies]]\nname = 'water'\nmaterial = 'water'\nshape = {{ kind = 'box', min = [0, {top}], max = [1, {level}] }}\n\
+             [[probes]]\nname = 'middle'\nbodies = ['plate']\nquantities = ['centre']\n\
+             shape = {{ kind = 'box', min = [0.48, 0], max = [0.52, 0.75] }}\n\
+             [equilibrium]\nspeed = 1e-3\nacceleration = 1e-2\n[time]\nend = 1\n[output]\npicture = false\n"
+        );
+        let directory = tempfile::tempdir().expect("temporary directory");
+        let path = directory.path().join("plate.toml");
+        std::fs::write(&path, job).expect("job");
+        succeed(&mut run(directory.path(), 1, 1, &path, &["--quiet"]));
+        let heights = History::read(directory.path(), "plate").column("centre_middle_y").to_vec();
+        let bent = heights[0] - heights[heights.len() - 1];
+        let load = 9.81 * (1000.0 * depth + density * thick);
+        let (stiffness, shear) = (
+            young * thick.powi(3) / 12.0 / (1.0 - poisson * poisson),
+            5.0 / 6.0 * young / 2.0 / (1.0 + poisson) * thick,
+        );
+        let exact = load / 384.0 / stiffness + load / 8.0 / shear;
+        println!("{cells} cells: {:.4} of Timoshenko's", bent / exact);
+        assert!((bent / exact - 1.0).abs() < 0.05, "{cells} cells: {bent} m, Timoshenko {exact} m");
+    }
+}
+
 #[test]
 fn fluids_slosh_with_the_same_bits_on_any_ranks_and_across_a_restart() {
     let more = "[[materials]]\nname = 'oil'\ndensity = 800\nmodel = 'fluid'\nbulk_modulus = 1e5\nviscosity = 0.1\n\

@@ -44,13 +44,14 @@ pub(super) fn bodies<const D: usize>(
 /// where any surface is off the lattice of the coarsest cells, they are fitted to it, but for inclined faces
 /// that no other body slides along. Particles of what flows leave their places anyway. Bodies that touch one
 /// on the lattice of the cells stay there, since the parts of one and the whole boxes of the other would
-/// overlap.
+/// overlap. Boxes of fluids may overlap with solids: fluid is shifted from where it is too dense.
 fn fit<const D: usize>(mut bodies: Vec<Body<D>>, file: &JobFile, space: &Space<D>) -> Vec<Body<D>> {
     let slack = 1e-9 * space.size.iter().fold(0.0, |most: f64, &size| most.max(size));
     let bounds: Vec<Aabb<D>> = bodies.iter().map(|body| body.shape.bounds().grown(slack)).collect();
+    let of_body = |body: &Body<D>| material_setup(&file.materials[body.material]).build();
     let may_move = |number: usize| {
-        let material = material_setup(&file.materials[bodies[number].material]).build();
-        file.bodies[number].sampling.is_none() && material.keeps_its_shape() && bodies[number].given.is_none()
+        let has_no_word = file.bodies[number].sampling.is_none() && bodies[number].given.is_none();
+        has_no_word && of_body(&bodies[number]).keeps_its_shape()
     };
     let may_move: Vec<bool> = (0..bodies.len()).map(may_move).collect();
     let may_be_fitted = |number: usize| match file.bodies[number].sampling {
@@ -66,7 +67,7 @@ fn fit<const D: usize>(mut bodies: Vec<Body<D>>, file: &JobFile, space: &Space<D
     // Cells of several sizes would cut the boxes of a lattice of its own.
     let is_uniform = file.tree.regions.is_empty() && file.adaptivity.is_none();
     let leaf = file.domain.root_edge / f64::from(1_u32 << file.tree.base_level);
-    let mut is_seen = vec![false; bodies.len()];
+    let mut is_seen: Vec<bool> = bodies.iter().map(|body| of_body(body).is_fluid()).collect();
     for first in 0..bodies.len() {
         let (mut group, mut next) = (Vec::new(), vec![first]);
         while let Some(number) = next.pop() {
@@ -78,7 +79,7 @@ fn fit<const D: usize>(mut bodies: Vec<Body<D>>, file: &JobFile, space: &Space<D
         }
         let lattice = |of: &[usize]| lattice_of(of.iter().map(|&number| &bodies[number]), leaf, space);
         if group.iter().all(|&number| lattice(&[number]) == Some([0.0; D])) {
-            continue;
+            continue; // a group without members, too
         }
         let own = lattice(&group).filter(|_| is_uniform && group.iter().all(|&number| may_move[number]));
         if let Some(origin) = own {

@@ -206,8 +206,8 @@ fn rounding_of_faces_does_not_matter() {
     assert_eq!(make(1.5 - 1e-12), exact);
 }
 
-/// A job with bodies of these shapes and materials ("rubber", "steel" or "sand") in a domain of 4 by 2 m, on
-/// cells of a quarter.
+/// A job with bodies of these shapes and materials ("rubber", "steel", "water" or "sand") in a domain of 4 by
+/// 2 m, on cells of a quarter.
 fn with_bodies(bodies: &[(&str, &str)], rest: &str) -> Problem<2> {
     let bodies: String = (bodies.iter().enumerate())
         .map(|(i, (material, shape))| {
@@ -219,6 +219,7 @@ fn with_bodies(bodies: &[(&str, &str)], rest: &str) -> Problem<2> {
         "version = 1\ndimension = 2\ntime = {{ end = 1 }}\ndomain = {{ size = [4, 2], root_edge = 1 }}\n\
          [[materials]]\nname = \"rubber\"\nmodel = \"hencky\"\n{elastic}\
          [[materials]]\nname = \"steel\"\nmodel = \"von_mises\"\nyield_stress = 1e4\n{elastic}\
+         [[materials]]\nname = \"water\"\nmodel = \"fluid\"\ndensity = 1000\nbulk_modulus = 1e6\n\
          [[materials]]\nname = \"sand\"\nmodel = \"drucker_prager\"\nfriction_angle = 30\n{elastic}{bodies}{rest}"
     );
     let any = parse(&text, "test.toml".as_ref()).unwrap_or_else(|faults| panic!("{faults:?}"));
@@ -247,6 +248,8 @@ fn solids_off_the_lattice_and_what_touches_them_are_fitted_without_a_word() {
     // Boxes of 1 / 2.2 cells do not lie in one leaf each, so they are whole.
     let odd = format!("{floor}\nparticles_per_cell = 2.2");
     assert_eq!(fitted(&[("rubber", disc), ("steel", &odd)]), [false, false]);
+    // Fluids give way.
+    assert_eq!(fitted(&[("water", bed), ("rubber", far), ("rubber", floor)]), [false, true, false]);
     // The parts of a disc and the whole boxes of sand would overlap.
     assert_eq!(
         fitted(&[("sand", bed), ("rubber", far), ("rubber", disc), ("rubber", floor)]),
