@@ -229,7 +229,31 @@ fn walls_with_known_errors_are_warned_of() {
     assert!(!found.iter().any(|line| line.contains("f_bar")), "{found:#?}");
 }
 
-/// By grips, by its own motion, between a face and a grip, by a prescribed velocity, and by tractions.
+/// A wall beside sand stays on the lattice of the cells; in air or in water it is as thick as the job says.
+#[test]
+fn solids_that_are_thicker_or_thinner_than_their_shape_are_warned_of() {
+    let job = |wide: f64, model: &str, more: &str| {
+        format!(
+            "version = 1\ndimension = 2\n[domain]\nsize = [4, 2]\nroot_edge = 1\n\
+             [boundaries]\nx_min.kind = 'slip'\nx_max.kind = 'slip'\ny_min.kind = 'slip'\ny_max.kind = 'slip'\n\
+             [[materials]]\nname = 'steel'\ndensity = 2000\nmodel = 'hencky'\nyoung = 1e7\npoisson = 0.3\n\
+             [[materials]]\nname = 'filling'\ndensity = 2000\n{model}\n\
+             [[bodies]]\nname = 'wall'\nmaterial = 'steel'\nshape = {{ kind = 'box', min = [1, 0], max = [{}, 1] }}\n{more}\n\
+             [[bodies]]\nname = 'fill'\nmaterial = 'filling'\nshape = {{ kind = 'box', min = [0, 0], max = [1, 1] }}\n\
+             [time]\nend = 1\n",
+            1.0 + wide
+        )
+    };
+    let sand = "model = 'mohr_coulomb'\nyoung = 1e7\npoisson = 0.3\nfriction_angle = 30";
+    let water = "model = 'fluid'\nbulk_modulus = 1e6";
+    let expected = "bodies[0]: \"wall\" is 1.18 m wide along x, and its particles, which lie on the lattice of the cells, \
+                    fill 1.125 m; expected faces on multiples of 125 mm, finer cells, or sampling = \"fitted\"";
+    assert_eq!(warnings(&job(1.18, sand, "")), [expected]);
+    for (wide, model, more) in [(1.25, sand, ""), (1.18, sand, "sampling = 'fitted'"), (1.18, water, "")] {
+        assert_eq!(warnings(&job(wide, model, more)), [""; 0], "{wide} {model} {more}");
+    }
+}
+
 #[test]
 fn elastic_bodies_stretched_further_than_they_hold_are_warned_of() {
     let fast = ("velocity = [0.1, 0]", "velocity = [1, 0]");

@@ -9,6 +9,7 @@
 //! | `ground.rs` | unit weights, radians, gravity upwards, water and points where no ground is |
 //! | `shock.rs` | gas without what its shocks need |
 //! | `stretch.rs` | elastic bodies that are stretched further than particles follow |
+//! | `thickness.rs` | solids that are thicker or thinner than their shape |
 //! | `units.rs` | properties that no matter has |
 //! | `name.rs` | how long a name they quote |
 use self::ground::foot;
@@ -27,6 +28,7 @@ mod ground;
 mod name;
 mod shock;
 mod stretch;
+mod thickness;
 mod units;
 
 /// Steps from which a run is called long.
@@ -46,6 +48,7 @@ pub fn warnings<const D: usize>(problem: &Problem<D>, steps: f64) -> Vec<String>
     ground::look(problem, &mut all);
     shock::look(problem, &mut all);
     stretch::look(problem, &mut all);
+    thickness::look(problem, &mut all);
     units::look(problem, steps, &mut all);
     if steps >= MANY_STEPS {
         all.push(format!(
