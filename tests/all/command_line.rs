@@ -332,7 +332,7 @@ const JOB: &str = "version = 1\ndimension = 2\ntitle = \"TITLE\"\ndomain = { siz
     bodies = [{ name = \"BODY\", material = \"MATERIAL\", shape = { kind = \"box\", min = [0, 0], max = [0.5, 0.5] } }]\n";
 
 /// Most seconds of processor time of a check, which answers at once. Two in a release build.
-const AT_ONCE: u32 = 20;
+const AT_ONCE: u32 = 15;
 
 /// Answer of `agimp check` to a job, given at once: exit code, standard output and standard error.
 fn check(text: &str) -> (i32, String, String) {

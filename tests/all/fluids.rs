@@ -179,8 +179,8 @@ fn water_at_rest_fills_its_volume_in_space() {
 
 /// Two fluids of unlike density share nodes beside level jumps that follow their surface, between a wall that
 /// stands and one that moves: the same bits on any ranks, and across a restart.
-/// A plate of elastic material, held at both ends, bears a quarter of a metre of water. It bends as far as the beam of
-/// Timoshenko of the same thickness does, also where that is no whole number of boxes.
+/// A plate of elastic material, held at both ends, bears a quarter of a metre of water. It bends as far as the
+/// beam of Timoshenko of the same thickness does, also where that is no whole number of boxes.
 #[test]
 fn plates_under_water_bend_by_their_thickness() {
     let (young, poisson, density, low) = (2e7, 0.3, 2700.0, 0.25);

@@ -9,8 +9,8 @@ use agimp::io::snapshot::Header;
 
 use super::mpirun;
 
-/// What ends soon has ended by then, also on a machine on which others keep it waiting.
-pub(crate) const SOON: Duration = Duration::from_secs(60);
+/// After this a run that ends soon has ended, also on a machine on which others keep it waiting.
+const SOON: Duration = Duration::from_secs(60);
 /// After this a run counts as hanging.
 const PATIENCE: Duration = Duration::from_secs(300);
 
@@ -136,7 +136,8 @@ impl Running {
         self.finish_within(SOON)
     }
 
-    fn finish_within(mut self, limit: Duration) -> Output {
+    /// Waits for the end; not longer than `limit`.
+    pub(crate) fn finish_within(mut self, limit: Duration) -> Output {
         let started = Instant::now();
         // The output is short enough for the pipes, so it can be read at the end.
         while self.child.try_wait().expect("child").is_none() {

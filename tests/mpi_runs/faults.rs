@@ -5,9 +5,12 @@ use std::time::{Duration, Instant};
 
 use crate::common::in_turn;
 use crate::common::launch::{
-    Outcome, Running, SOON, agimp, contents, file, is_alive, job, last_step, mpirun, reasons, results, run,
-    signal, succeed, text, variant,
+    Outcome, Running, agimp, contents, file, is_alive, job, last_step, mpirun, reasons, results, run, signal,
+    succeed, text, variant,
 };
+
+/// All ranks must have ended this long after one has failed or was killed.
+const SOON: Duration = Duration::from_secs(10);
 
 /// A few moments, chosen by a fixed seed; see [`killed_at_twenty_moments`].
 #[test]
@@ -86,10 +89,11 @@ fn kill_at_random_moments(kills: u64, seed: u64, mut tell: impl FnMut(Kill)) {
         assert_eq!(processes.len(), ranks);
         signal(processes.get(victim).copied().unwrap_or(running.launcher()), "KILL");
         let killed = Instant::now();
-        let output = running.finish_soon();
+        let output = running.finish_within(SOON);
         assert!(!output.status.success(), "{}", text(&output));
         all_ended(&processes);
         let ended_after = killed.elapsed();
+        assert!(ended_after < SOON, "ranks were there for {ended_after:?}");
         let left = contents(&directory.join("out").join(name));
         for file in left.keys().filter(|file| file.ends_with(".hdf") && !file.contains(".tree.")) {
             let path = directory.join("out").join(name).join(file);
@@ -142,7 +146,7 @@ fn a_failure_while_writing_names_the_step() {
     running.wait_for_step(directory, name, 9);
     let results = directory.join("out").join(name);
     std::fs::rename(&results, directory.join("out/elsewhere")).expect("renamed");
-    let output = running.finish_soon();
+    let output = running.finish_within(SOON);
     let shown = text(&output);
     assert_eq!(output.status.code(), Some(1), "{shown}");
     let messages: Vec<&str> = shown.lines().filter(|line| line.starts_with("agimp:")).collect();
@@ -160,9 +164,11 @@ fn an_error_of_one_rank_is_told_once() {
     let _turn = in_turn();
     for ranks in [1, 3] {
         let home = tempfile::tempdir().expect("temporary directory");
+        let started = Instant::now();
         let running = Running::start(&mut run(home.path(), ranks, 1, &job("unstable"), &["--quiet"]));
-        let output = running.finish_soon();
+        let output = running.finish_within(SOON);
         let shown = text(&output);
+        assert!(started.elapsed() < SOON);
         assert_eq!(output.status.code(), Some(1), "{shown}");
         let [message] = reasons(&shown)[..] else { panic!("one message: {shown}") };
         for part in ["step ", "time ", "rank ", "particle ", "left the domain"] {
@@ -182,7 +188,7 @@ fn a_bad_job_is_told_once() {
         .expect("written");
     for ranks in [1, 2] {
         let command = &mut run(directory, ranks, 1, &directory.join("bad.toml"), &[]);
-        let output = Running::start(command).finish_soon();
+        let output = Running::start(command).finish_within(SOON);
         let shown = text(&output);
         assert_eq!(output.status.code(), Some(2), "{shown}");
         assert_eq!(shown.matches("bad.toml:7:1: ").count(), 1, "one message: {shown}");
@@ -197,7 +203,7 @@ fn an_unwritable_directory_ends_all_ranks() {
     let _turn = in_turn();
     let home = tempfile::tempdir().expect("temporary directory");
     std::fs::write(home.path().join("out"), "a file in the way").expect("written");
-    let output = Running::start(&mut run(home.path(), 3, 1, &job("few_leaves"), &[])).finish_soon();
+    let output = Running::start(&mut run(home.path(), 3, 1, &job("few_leaves"), &[])).finish_within(SOON);
     let shown = text(&output);
     assert_eq!(output.status.code(), Some(1), "{shown}");
     assert_eq!(shown.matches("agimp:").count(), 1, "one message: {shown}");
@@ -222,7 +228,7 @@ fn a_rank_that_cannot_write_ends_all_with_the_reason() {
         let process = running.ranks().into_iter().find(|&process| rank_of(process) == limited);
         let process = process.expect("the rank runs").to_string();
         succeed(Command::new("prlimit").args(["--pid", &process, "--fsize=150000"]));
-        let output = running.finish_soon();
+        let output = running.finish_within(4 * SOON);
         let shown = text(&output);
         assert_eq!(output.status.code(), Some(1), "{shown}");
         assert_eq!(shown.matches("agimp: ").count(), 1, "one message: {shown}");
@@ -260,7 +266,7 @@ fn ranks_end_after_the_message_has_gone_out() {
         exec "$0" run missing.toml"#;
     let mut command = mpirun(directory, 2);
     command.args(["bash", "-c", slow, env!("CARGO_BIN_EXE_agimp")]);
-    let output = Running::start(&mut command).finish_soon();
+    let output = Running::start(&mut command).finish_within(SOON);
     assert_eq!(output.status.code(), Some(2), "{}", text(&output));
     let started = Instant::now();
     while !directory.join("told").exists() {
@@ -280,7 +286,7 @@ fn a_job_is_checked_once() {
     let checked = |path: &Path| {
         let mut command = mpirun(home.path(), 2);
         let output = Running::start(command.arg(env!("CARGO_BIN_EXE_agimp")).arg("check").arg(path));
-        let output = output.finish_soon();
+        let output = output.finish_within(SOON);
         (output.status.code(), text(&output))
     };
     for name in ["few_leaves", "adaptive_2d"] {
@@ -300,13 +306,14 @@ fn a_wrong_argument_is_told_once() {
     let _turn = in_turn();
     let home = tempfile::tempdir().expect("temporary directory");
     for ranks in [1, 3] {
-        let output = Running::start(&mut run(home.path(), ranks, 0, Path::new("a.toml"), &[])).finish_soon();
+        let output =
+            Running::start(&mut run(home.path(), ranks, 0, Path::new("a.toml"), &[])).finish_within(SOON);
         let shown = text(&output);
         assert_eq!(output.status.code(), Some(2), "{shown}");
         assert_eq!(shown.matches("invalid value '0' for '--threads").count(), 1, "one message: {shown}");
     }
     let mut command = mpirun(home.path(), 3);
-    let output = Running::start(command.args([env!("CARGO_BIN_EXE_agimp"), "--help"])).finish_soon();
+    let output = Running::start(command.args([env!("CARGO_BIN_EXE_agimp"), "--help"])).finish_within(SOON);
     assert_eq!(output.status.code(), Some(0), "{}", text(&output));
     assert_eq!(text(&output).matches("Print the JSON schema").count(), 1, "{}", text(&output));
 }

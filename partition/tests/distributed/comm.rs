@@ -169,7 +169,7 @@ pub(crate) fn panic_in_a_step(comm: &Comm) {
 pub(crate) fn panic_everywhere(_: &Comm) {
     let threads = [(); 2].map(|()| std::thread::spawn(|| panic!("deliberate")));
     threads.into_iter().for_each(|thread| drop(thread.join()));
-    std::thread::sleep(Duration::from_secs(100));
+    std::thread::sleep(Duration::from_secs(20));
 }
 
 pub(crate) fn panic_on_last(comm: &Comm) {
